@@ -1,0 +1,29 @@
+//! N3P: automated parking with a learned preparatory pose.
+//!
+//! The modules in reading order; each uses those above it, never one below.
+//!
+//! - [`rng`]: one seed, many named random streams
+//! - [`geometry`]: poses, frames, polygons
+//! - [`vehicle`]: dimensions, footprint, kinematics
+//! - [`curves`]: segments, paths, Reeds-Shepp words
+//! - [`world`]: scenes, exact swept collision, cells, the abstraction, the generator
+//! - [`planners`]: the `Planner` trait and Hybrid A* with Reeds-Shepp expansion
+//! - [`selectors`]: preparatory poses by KNN and MLP, and N3P itself
+//! - [`dataset`]: collecting samples into Parquet, and reading them back
+//! - [`training`]: rows → artefacts
+//! - [`evaluation`]: episodes, the independent oracle, tables, reports
+//! - [`experiments`]: a whole pipeline from one versioned file
+//! - [`cli`]: what the binaries share
+
+pub mod cli;
+pub mod curves;
+pub mod dataset;
+pub mod evaluation;
+pub mod experiments;
+pub mod geometry;
+pub mod planners;
+pub mod rng;
+pub mod selectors;
+pub mod training;
+pub mod vehicle;
+pub mod world;

@@ -1,0 +1,94 @@
+//! The cost of driving, the same for every method of a table.
+//!
+//! The paper gives the terms (λ_f or λ_b per metre, gear changes, |δ|, |Δδ|) and no
+//! weights; ours are below.
+
+use serde::{Deserialize, Serialize};
+
+use crate::curves::Segment;
+use crate::vehicle::{Gear, Vehicle};
+
+/// Weights of the cost terms.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CostModel {
+    /// λ_f, per metre driven forward.
+    pub forward: f64,
+    /// λ_b, per metre driven backward.
+    pub backward: f64,
+    /// Per change of gear.
+    pub gear_change: f64,
+    /// Per radian of |δ| and metre.
+    pub steer: f64,
+    /// Per radian of |Δδ| between segments.
+    pub steer_change: f64,
+}
+
+impl Default for CostModel {
+    fn default() -> Self {
+        Self { forward: 1.0, backward: 1.2, gear_change: 3.0, steer: 0.05, steer_change: 0.2 }
+    }
+}
+
+/// What the cost of the next segment depends on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DriveState {
+    /// The gear driven last; `None` at the start, where either gear is free.
+    pub gear: Option<Gear>,
+    /// The steering angle driven last, radians.
+    pub steer: f64,
+}
+
+impl DriveState {
+    /// Standing still with straight wheels.
+    pub const PARKED: DriveState = DriveState { gear: None, steer: 0.0 };
+}
+
+impl CostModel {
+    /// Checks every field: finite, not negative, and metres not free.
+    pub fn validate(&self) -> Result<(), String> {
+        for (field, v, min) in [
+            ("forward", self.forward, 1e-3),
+            ("backward", self.backward, 1e-3),
+            ("gear_change", self.gear_change, 0.0),
+            ("steer", self.steer, 0.0),
+            ("steer_change", self.steer_change, 0.0),
+        ] {
+            if !(v.is_finite() && v >= min && v <= 1e6) {
+                return Err(format!("cost.{field} is {v}; expected a number from {min} to 1e6"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Cost per metre in `gear`, without steering.
+    pub fn per_metre(&self, gear: Gear) -> f64 {
+        match gear {
+            Gear::Forward => self.forward,
+            Gear::Backward => self.backward,
+        }
+    }
+
+    /// Cost of one segment driven with steering angle `steer`, and the state after it.
+    pub fn segment(&self, before: DriveState, length: f64, steer: f64) -> (f64, DriveState) {
+        let gear = Gear::of(length);
+        let mut cost = length.abs() * (self.per_metre(gear) + self.steer * steer.abs());
+        if before.gear.is_some_and(|g| g != gear) {
+            cost += self.gear_change;
+        }
+        cost += self.steer_change * (steer - before.steer).abs();
+        (cost, DriveState { gear: Some(gear), steer })
+    }
+
+    /// Cost of driving `segments` from standstill.
+    pub fn path(&self, vehicle: &Vehicle, segments: &[Segment]) -> f64 {
+        let mut state = DriveState::PARKED;
+        let mut total = 0.0;
+        for s in segments {
+            let (cost, next) = self.segment(state, s.length, vehicle.steer(s.curvature));
+            total += cost;
+            state = next;
+        }
+        total
+    }
+}

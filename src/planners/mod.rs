@@ -1,0 +1,111 @@
+//! Planners: from a [`Problem`] to a path or a reason why there is none.
+//!
+//! Every method of a table, learnt or not, meets the evaluation as a [`Planner`].
+//! The search core is in [`hybrid_astar`]; its parts are [`lattice`], [`cost_to_go`],
+//! [`analytic`] (Reeds-Shepp expansion) and [`cost`].
+
+pub mod analytic;
+pub mod cost;
+pub mod cost_to_go;
+pub mod hybrid_astar;
+mod lattice;
+mod problem;
+
+pub use analytic::AnalyticTail;
+pub use hybrid_astar::{HybridAStar, HybridAStarConfig};
+pub use problem::{Problem, ProblemError};
+
+use crate::curves::Path;
+use crate::geometry::Pose;
+use crate::world::abstraction::Abstraction;
+
+/// Anything that plans a path. Implementations keep buffers between calls; results
+/// never depend on earlier calls.
+pub trait Planner {
+    /// The method name of tables and files, such as `ha-rs`.
+    fn name(&self) -> &str;
+
+    /// Plans one problem. "No path" is a result, not an error.
+    fn plan(&mut self, problem: &Problem, budget: Budget) -> PlanResult;
+}
+
+/// How much work a planner may spend. Counts work, never time, so that results are
+/// the same on every machine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Budget {
+    /// Node expansions over all searches of the call.
+    pub max_expansions: usize,
+}
+
+/// What a planner found, and what it took.
+#[derive(Clone, Debug)]
+pub struct PlanResult {
+    /// The path in the problem's frame, from the start exactly to the goal.
+    pub outcome: Result<Path, NoPath>,
+    /// Node expansions spent.
+    pub expansions: usize,
+    /// The Reeds-Shepp tail that reached the goal, when one did.
+    pub tail: Option<AnalyticTail>,
+    /// What N3P took for the spot and did with it; `None` for plain planners.
+    pub guidance: Option<Guidance>,
+}
+
+impl PlanResult {
+    /// A result without path.
+    pub fn none(reason: NoPath, expansions: usize) -> Self {
+        Self { outcome: Err(reason), expansions, tail: None, guidance: None }
+    }
+}
+
+/// Why there is no path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NoPath {
+    /// The expansion budget ended the search.
+    #[error("budget spent")]
+    BudgetSpent,
+    /// Every reachable state was expanded.
+    #[error("no path at this resolution")]
+    Exhausted,
+    /// The goal is enclosed: the cost-to-go never reaches the start.
+    #[error("goal not reachable from the start")]
+    Enclosed,
+    /// The method does not apply to this problem.
+    #[error("not applicable")]
+    NotApplicable,
+    /// The path found did not pass the final swept check (our bug; reported, not hidden).
+    #[error("path rejected by the final check")]
+    Uncertified,
+}
+
+/// What guided planning did: for rows, pictures and explanations.
+#[derive(Clone, Debug)]
+pub struct Guidance {
+    /// The abstraction used; `None` when the scene has no such structure.
+    pub abstraction: Option<Abstraction>,
+    /// The preparatory pose driven to, in the problem's frame.
+    pub preparatory: Option<Pose>,
+    /// How the path came about.
+    pub route: Route,
+}
+
+/// How guided planning reached its path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Route {
+    /// Reeds-Shepp curves alone: no search at all.
+    Direct,
+    /// A search reached the preparatory pose (or left it for the goal).
+    Searched,
+    /// The full search from start to goal, as the last resort.
+    Fallback,
+}
+
+impl Route {
+    /// The name used in rows.
+    pub fn name(self) -> &'static str {
+        match self {
+            Route::Direct => "direct",
+            Route::Searched => "searched",
+            Route::Fallback => "fallback",
+        }
+    }
+}

@@ -1,0 +1,30 @@
+//! Preparatory poses: learnt selectors, their artefacts, and N3P itself.
+//!
+//! A [`PoseSelector`] ranks preparatory poses for [`Features`]; [`knn`] and [`mlp`] are
+//! the two of the paper, [`artefact`] reads and checks their files, and [`guided`] is
+//! N3P: a planner that uses a selector.
+
+pub mod artefact;
+mod features;
+pub mod guided;
+pub mod knn;
+pub mod mlp;
+
+pub use features::Features;
+
+use crate::geometry::Pose;
+use crate::world::ParkingType;
+use crate::world::cell::Grid;
+
+/// Ranks preparatory poses. Implementations are immutable and shared between threads.
+pub trait PoseSelector: Send + Sync {
+    /// Appends up to `k` preparatory poses (rear axle, spot frame) for `features`, best
+    /// first. Appends none where the model knows nothing, such as an infeasible cell.
+    fn select(&self, features: &Features, k: usize, out: &mut Vec<Pose>);
+
+    /// The grid of cells the model was trained on.
+    fn grid(&self) -> &Grid;
+
+    /// The parking types the model was trained for.
+    fn kinds(&self) -> Vec<ParkingType>;
+}

@@ -1,0 +1,199 @@
+//! The car: dimensions, steering limit, speeds, footprint.
+//!
+//! Kinematic bicycle, pose at the rear-axle centre (paper eq. 1): curvature
+//! `κ = tan δ / wheelbase`.
+
+use serde::{Deserialize, Serialize};
+
+use crate::geometry::{Aabb, Polygon, Pose};
+
+/// Direction of motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Gear {
+    /// Nose first.
+    Forward,
+    /// Tail first.
+    Backward,
+}
+
+impl Gear {
+    /// +1 forward, −1 backward.
+    pub fn sign(self) -> f64 {
+        match self {
+            Gear::Forward => 1.0,
+            Gear::Backward => -1.0,
+        }
+    }
+
+    /// The gear of a signed length; zero counts as forward.
+    pub fn of(length: f64) -> Gear {
+        if length < 0.0 { Gear::Backward } else { Gear::Forward }
+    }
+}
+
+/// A vehicle. The default is the paper's 2024 Honda Accord.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Vehicle {
+    /// Bumper to bumper, metres.
+    pub length: f64,
+    /// Side to side, metres.
+    pub width: f64,
+    /// Rear to front axle, metres.
+    pub wheelbase: f64,
+    /// Rear axle to rear bumper, metres.
+    pub rear_overhang: f64,
+    /// Largest steering angle of the front wheels, radians.
+    pub max_steer: f64,
+    /// Speed when driving forward, m/s (only for times and the Δδ metric).
+    #[serde(default = "default_forward_speed")]
+    pub forward_speed: f64,
+    /// Speed when driving backward, m/s.
+    #[serde(default = "default_backward_speed")]
+    pub backward_speed: f64,
+}
+
+fn default_forward_speed() -> f64 {
+    2.0
+}
+
+fn default_backward_speed() -> f64 {
+    1.0
+}
+
+impl Default for Vehicle {
+    fn default() -> Self {
+        Self {
+            length: 4.97,
+            width: 1.86,
+            wheelbase: 2.83,
+            rear_overhang: 1.10,
+            max_steer: 34.9_f64.to_radians(),
+            forward_speed: default_forward_speed(),
+            backward_speed: default_backward_speed(),
+        }
+    }
+}
+
+/// A vehicle field outside its range.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("vehicle.{field} is {value}; it must be {expected}")]
+pub struct VehicleError {
+    /// Name of the field.
+    pub field: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// What would be right.
+    pub expected: &'static str,
+}
+
+impl Vehicle {
+    /// Checks every field.
+    pub fn validate(&self) -> Result<(), VehicleError> {
+        let check = |field, value: f64, ok: bool, expected| {
+            if value.is_finite() && ok { Ok(()) } else { Err(VehicleError { field, value, expected }) }
+        };
+        let lengths = "between 0.1 and 50 metres";
+        let is_length = |v: f64| (0.1..=50.0).contains(&v);
+        check("length", self.length, is_length(self.length), lengths)?;
+        check("width", self.width, is_length(self.width), lengths)?;
+        check(
+            "wheelbase",
+            self.wheelbase,
+            is_length(self.wheelbase) && self.wheelbase < self.length,
+            "at least 0.1 metres and less than the length",
+        )?;
+        check(
+            "rear_overhang",
+            self.rear_overhang,
+            self.rear_overhang >= 0.0 && self.rear_overhang + self.wheelbase <= self.length,
+            "at least 0 metres, and with the wheelbase no more than the length",
+        )?;
+        check(
+            "max_steer",
+            self.max_steer,
+            (0.01..1.5).contains(&self.max_steer),
+            "between 0.01 and 1.5 radians",
+        )?;
+        let speeds = "between 0.01 and 50 m/s";
+        let is_speed = |v: f64| (0.01..=50.0).contains(&v);
+        check("forward_speed", self.forward_speed, is_speed(self.forward_speed), speeds)?;
+        check("backward_speed", self.backward_speed, is_speed(self.backward_speed), speeds)
+    }
+
+    /// Largest curvature, 1/m.
+    pub fn max_curvature(&self) -> f64 {
+        self.max_steer.tan() / self.wheelbase
+    }
+
+    /// Radius of the rear axle's tightest circle, metres.
+    pub fn turning_radius(&self) -> f64 {
+        self.wheelbase / self.max_steer.tan()
+    }
+
+    /// Steering angle that drives `curvature`, radians.
+    pub fn steer(&self, curvature: f64) -> f64 {
+        (curvature * self.wheelbase).atan()
+    }
+
+    /// Rear axle to front bumper, metres.
+    pub fn front_extent(&self) -> f64 {
+        self.length - self.rear_overhang
+    }
+
+    /// The footprint in the vehicle's own frame, grown by `margin` metres on every side.
+    pub fn footprint(&self, margin: f64) -> Aabb {
+        let half = self.width / 2.0;
+        Aabb::new(-self.rear_overhang, -half, self.front_extent(), half).inflated(margin)
+    }
+
+    /// The footprint at `pose`.
+    pub fn footprint_at(&self, pose: Pose) -> Polygon {
+        Polygon::rectangle(pose, self.footprint(0.0))
+    }
+
+    /// Distance from the rear axle to the footprint's centre, along the heading, metres.
+    pub fn center_offset(&self) -> f64 {
+        self.length / 2.0 - self.rear_overhang
+    }
+
+    /// The pose of the footprint's centre for a rear-axle pose.
+    pub fn body_center(&self, pose: Pose) -> Pose {
+        pose.shifted(self.center_offset())
+    }
+
+    /// The rear-axle pose whose footprint is centred on `center`.
+    pub fn rear_axle(&self, center: Pose) -> Pose {
+        center.shifted(-self.center_offset())
+    }
+
+    /// Speed in `gear`, m/s.
+    pub fn speed(&self, gear: Gear) -> f64 {
+        match gear {
+            Gear::Forward => self.forward_speed,
+            Gear::Backward => self.backward_speed,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_accord_turns_on_4_057_metres() {
+        let v = Vehicle::default();
+        assert!(v.validate().is_ok());
+        assert!((v.turning_radius() - 4.057).abs() < 5e-4, "{}", v.turning_radius());
+        assert!((v.steer(v.max_curvature()) - v.max_steer).abs() < 1e-12);
+    }
+
+    #[test]
+    fn says_which_field_is_wrong() {
+        let v = Vehicle { width: f64::NAN, ..Vehicle::default() };
+        assert_eq!(v.validate().unwrap_err().field, "width");
+        let v = Vehicle { rear_overhang: 3.0, ..Vehicle::default() };
+        assert_eq!(v.validate().unwrap_err().field, "rear_overhang");
+    }
+}
