@@ -132,7 +132,8 @@ mod tests {
     use super::*;
 
     fn zigzag() -> Path {
-        let segments = [(0.0, 1.0), (0.0, 0.5), (0.2, 2.0), (0.2, -1.0), (0.0, 1e-12), (-0.2, -1.0)];
+        let segments =
+            [(0.0, 1.0), (0.0, 0.5), (0.2, 2.0), (0.2, -1.0), (0.0, 1e-12), (-0.2, -1.0)];
         Path::new(
             Pose::new(1.0, 2.0, 0.3),
             segments.map(|(curvature, length)| Segment { curvature, length }),

@@ -57,11 +57,6 @@ impl Aabb {
 
     /// The corners, counter-clockwise from the lower left.
     pub fn corners(&self) -> [Vec2; 4] {
-        [
-            self.min,
-            Vec2::new(self.max.x, self.min.y),
-            self.max,
-            Vec2::new(self.min.x, self.max.y),
-        ]
+        [self.min, Vec2::new(self.max.x, self.min.y), self.max, Vec2::new(self.min.x, self.max.y)]
     }
 }

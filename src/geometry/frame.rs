@@ -16,8 +16,7 @@ pub struct Frame {
 
 impl Frame {
     /// The frame that is the world itself.
-    pub const WORLD: Frame =
-        Frame { origin_in_world: Pose::new(0.0, 0.0, 0.0), mirrored: false };
+    pub const WORLD: Frame = Frame { origin_in_world: Pose::new(0.0, 0.0, 0.0), mirrored: false };
 
     /// A world point, seen from this frame.
     pub fn local_from_world_point(&self, p: Vec2) -> Vec2 {

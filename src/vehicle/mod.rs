@@ -92,7 +92,11 @@ impl Vehicle {
     /// Checks every field.
     pub fn validate(&self) -> Result<(), VehicleError> {
         let check = |field, value: f64, ok: bool, expected| {
-            if value.is_finite() && ok { Ok(()) } else { Err(VehicleError { field, value, expected }) }
+            if value.is_finite() && ok {
+                Ok(())
+            } else {
+                Err(VehicleError { field, value, expected })
+            }
         };
         let lengths = "between 0.1 and 50 metres";
         let is_length = |v: f64| (0.1..=50.0).contains(&v);

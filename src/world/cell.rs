@@ -59,7 +59,11 @@ impl Axis {
     /// Index of the largest value ≤ `v`; `None` below the smallest.
     pub fn floor(&self, v: f64) -> Option<usize> {
         let steps = (v - self.min) / self.step + Self::SLACK;
-        if steps < 0.0 || steps.is_nan() { None } else { Some((steps as usize).min(self.len() - 1)) }
+        if steps < 0.0 || steps.is_nan() {
+            None
+        } else {
+            Some((steps as usize).min(self.len() - 1))
+        }
     }
 
     fn validate(&self, field: &str) -> Result<(), GridError> {

@@ -1,0 +1,1 @@
+//! TPCAP benchmark files.
