@@ -1,12 +1,13 @@
 //! The region the rear axle stays in.
 
 use crate::curves::Segment;
-use crate::geometry::{Pose, Vec2};
+use crate::geometry::{Aabb, Pose, Vec2};
 
 /// A convex quadrilateral as half-planes `normal · p ≤ offset`, normals of length one.
 #[derive(Clone, Debug)]
 pub(super) struct ConvexBounds {
     sides: [(Vec2, f64); 4],
+    aabb: Aabb,
 }
 
 impl ConvexBounds {
@@ -17,7 +18,11 @@ impl ConvexBounds {
             let normal = Vec2::new(d.y, -d.x);
             (normal, normal.dot(&corners[i]) + 1e-9)
         };
-        Self { sides: [side(0), side(1), side(2), side(3)] }
+        Self { sides: [side(0), side(1), side(2), side(3)], aabb: Aabb::around(corners) }
+    }
+
+    pub fn aabb(&self) -> Aabb {
+        self.aabb
     }
 
     pub fn contains(&self, p: Vec2) -> bool {

@@ -56,6 +56,11 @@ impl CollisionWorld {
         &self.footprint
     }
 
+    /// The box around the region the rear axle stays in; `None` without bounds.
+    pub fn bounds_aabb(&self) -> Option<Aabb> {
+        self.bounds.as_ref().map(ConvexBounds::aabb)
+    }
+
     /// Whether the footprint at `pose` touches nothing and its axle is in bounds.
     pub fn pose_is_free(&self, pose: Pose) -> bool {
         if self.bounds.as_ref().is_some_and(|b| !b.contains(pose.position())) {
