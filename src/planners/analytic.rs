@@ -9,8 +9,8 @@ use crate::curves::reeds_shepp::{self, Word};
 use crate::curves::Segment;
 use crate::geometry::Pose;
 use crate::vehicle::{Gear, Vehicle};
-use crate::world::collision::CollisionWorld;
 
+use super::Problem;
 use super::cost::{CostModel, DriveState};
 
 /// The Reeds-Shepp curve (and entry straight) that reached the goal.
@@ -31,43 +31,91 @@ impl AnalyticTail {
     }
 }
 
-/// A goal pose and the straights that may lead into it.
+/// A goal pose, and the poses from which the rest of the way into it is known.
 #[derive(Clone, Debug)]
-pub(super) struct GoalSet {
+pub(crate) struct GoalSet {
     /// The goal itself.
     pub pose: Pose,
-    /// Poses to end a curve at, with the signed straight from there to the goal; the goal
-    /// itself (straight of zero) first.
-    entries: Vec<(Pose, f64)>,
+    entries: Vec<Entry>,
+}
+
+/// A pose to end a curve at, and the free motion from there to the goal.
+#[derive(Clone, Debug)]
+pub(crate) struct Entry {
+    /// The pose.
+    pub pose: Pose,
+    /// The motion from the pose to the goal; empty at the goal itself.
+    pub rest: Vec<Segment>,
+    /// Whether this is a preparatory pose (else a straight leads into the goal).
+    pub preparatory: bool,
+    /// Cost of `rest` when arriving in its gear with its steering.
+    cost: f64,
+    /// Gear and steering that `rest` begins with.
+    first: Option<(Gear, f64)>,
+}
+
+impl Entry {
+    fn new(
+        pose: Pose,
+        rest: Vec<Segment>,
+        preparatory: bool,
+        vehicle: &Vehicle,
+        model: &CostModel,
+    ) -> Self {
+        let first = rest.first().map(|s| (s.gear(), vehicle.steer(s.curvature)));
+        let mut state = first.map_or(DriveState::PARKED, |(gear, steer)| DriveState {
+            gear: Some(gear),
+            steer,
+        });
+        let mut cost = 0.0;
+        for s in &rest {
+            let (c, next) = model.segment(state, s.length, vehicle.steer(s.curvature));
+            cost += c;
+            state = next;
+        }
+        Self { pose, rest, preparatory, cost, first }
+    }
+
+    /// Cost of driving `rest` on arrival in `state`.
+    fn cost_from(&self, state: DriveState, model: &CostModel) -> f64 {
+        let Some((gear, steer)) = self.first else { return 0.0 };
+        let change = if state.gear.is_some_and(|g| g != gear) { model.gear_change } else { 0.0 };
+        self.cost + change + model.steer_change * (steer - state.steer).abs()
+    }
 }
 
 impl GoalSet {
     /// Only the pose itself.
     pub fn single(pose: Pose) -> Self {
-        Self { pose, entries: vec![(pose, 0.0)] }
+        let goal = Entry { pose, rest: Vec::new(), preparatory: false, cost: 0.0, first: None };
+        Self { pose, entries: vec![goal] }
     }
 
-    /// The pose and every free entry straight into it in one of `gears`, `step` metres
-    /// apart and at most `longest` metres long.
-    pub fn with_entries(
-        pose: Pose,
-        gears: &[Gear],
-        step: f64,
-        longest: f64,
-        world: &CollisionWorld,
-    ) -> Self {
-        let mut set = Self::single(pose);
-        for gear in gears {
+    /// Adds every free entry straight into the goal of `problem`, `step` metres apart and
+    /// at most `longest` metres long.
+    pub fn add_straights(&mut self, problem: &Problem, model: &CostModel, step: f64, longest: f64) {
+        for gear in problem.entry_gears() {
             for i in 1..=(longest / step + 1e-9) as usize {
-                let entry = gear.sign() * i as f64 * step;
-                let outward = Segment::straight(-entry);
-                if !world.segment_is_free(pose, outward) {
+                let entry = Segment::straight(gear.sign() * i as f64 * step);
+                let outward = entry.reversed();
+                if !problem.collision.segment_is_free(self.pose, outward) {
                     break;
                 }
-                set.entries.push((outward.end(pose), entry));
+                let pose = outward.end(self.pose);
+                self.entries.push(Entry::new(pose, vec![entry], false, &problem.vehicle, model));
             }
         }
-        set
+    }
+
+    /// Adds a preparatory pose from which `rest` leads to the goal without contact.
+    pub fn add_preparatory(
+        &mut self,
+        pose: Pose,
+        rest: Vec<Segment>,
+        vehicle: &Vehicle,
+        model: &CostModel,
+    ) {
+        self.entries.push(Entry::new(pose, rest, true, vehicle, model));
     }
 }
 
@@ -82,50 +130,76 @@ pub(super) struct AnalyticExpansion {
 struct Candidate {
     cost: f64,
     word: Word,
-    entry: f64,
+    entry: usize,
 }
 
-impl AnalyticExpansion {
-    /// The cheapest free curve from the free pose `from` into `goal`, and its cost.
-    ///
-    /// `state`: gear and steering on arrival at `from`. Curves of cost `bound` or more are
-    /// not looked at.
-    pub fn connect(
-        &mut self,
-        from: Pose,
-        state: DriveState,
-        goal: &GoalSet,
-        vehicle: &Vehicle,
-        cost: &CostModel,
-        world: &CollisionWorld,
-        bound: f64,
-    ) -> Option<(AnalyticTail, f64)> {
-        self.candidates.clear();
-        let radius = vehicle.turning_radius();
-        for &(to, entry) in &goal.entries {
-            self.words.clear();
-            reeds_shepp::words(from, to, radius, &mut self.words);
-            for &word in &self.words {
-                let cost = curve_cost(&word, entry, state, vehicle, cost);
-                if cost < bound {
-                    self.candidates.push(Candidate { cost, word, entry });
-                }
-            }
-        }
-        self.candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        let free = self.candidates.iter().find(|c| world.segments_are_free(from, c.word.segments()));
-        free.map(|c| (AnalyticTail { from, word: c.word, entry: c.entry }, c.cost))
+/// A free way into a goal set: a curve, then the rest of an entry.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Connection<'a> {
+    /// Where the curve begins.
+    pub from: Pose,
+    /// The curve.
+    pub word: Word,
+    /// Where the curve ends and what follows.
+    pub entry: &'a Entry,
+}
+
+impl Connection<'_> {
+    /// Curve and rest.
+    pub fn segments(&self) -> impl Iterator<Item = Segment> + '_ {
+        self.word.segments().iter().chain(&self.entry.rest).copied()
+    }
+
+    /// The preparatory pose on the way: the learnt one, or else where the curve begins.
+    pub fn preparatory_pose(&self) -> Pose {
+        if self.entry.preparatory { self.entry.pose } else { self.from }
+    }
+
+    /// The curve as a tail; the entry must be a straight.
+    pub fn tail(&self) -> AnalyticTail {
+        let entry = if self.entry.preparatory { None } else { self.entry.rest.first() };
+        AnalyticTail { from: self.from, word: self.word, entry: entry.map_or(0.0, |s| s.length) }
     }
 }
 
-/// Cost of a word and its entry straight.
+impl AnalyticExpansion {
+    /// The cheapest free way from the free pose `from` into `goal`.
+    ///
+    /// `state`: gear and steering on arrival at `from`.
+    pub fn connect<'a>(
+        &mut self,
+        from: Pose,
+        state: DriveState,
+        goal: &'a GoalSet,
+        problem: &Problem,
+        model: &CostModel,
+    ) -> Option<Connection<'a>> {
+        self.candidates.clear();
+        let vehicle = &problem.vehicle;
+        let radius = vehicle.turning_radius();
+        for (i, entry) in goal.entries.iter().enumerate() {
+            self.words.clear();
+            reeds_shepp::words(from, entry.pose, radius, &mut self.words);
+            for &word in &self.words {
+                let (cost, arrival) = curve_cost(&word, state, vehicle, model);
+                let cost = cost + entry.cost_from(arrival, model);
+                self.candidates.push(Candidate { cost, word, entry: i });
+            }
+        }
+        self.candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let world = &problem.collision;
+        let free = self.candidates.iter().find(|c| world.segments_are_free(from, c.word.segments()));
+        free.map(|c| Connection { from, word: c.word, entry: &goal.entries[c.entry] })
+    }
+}
+
+/// Cost of a word, and gear and steering at its end.
 fn curve_cost(
     word: &Word,
-    entry: f64,
     mut state: DriveState,
     vehicle: &Vehicle,
     model: &CostModel,
-) -> f64 {
+) -> (f64, DriveState) {
     let mut total = 0.0;
     for s in word.segments() {
         let steer = vehicle.max_steer * sign_or_zero(s.curvature);
@@ -133,10 +207,7 @@ fn curve_cost(
         total += cost;
         state = next;
     }
-    if entry != 0.0 {
-        total += model.segment(state, entry, 0.0).0;
-    }
-    total
+    (total, state)
 }
 
 /// −1, 0 or 1.
@@ -158,7 +229,7 @@ pub(super) fn least_curve_cost(
     // Gear and wheels on arrival are unknown: neither is charged.
     let costs = words.iter().map(|w| {
         let steer = w.segments().first().map_or(0.0, |s| vehicle.max_steer * sign_or_zero(s.curvature));
-        curve_cost(w, 0.0, DriveState { gear: None, steer }, vehicle, model)
+        curve_cost(w, DriveState { gear: None, steer }, vehicle, model).0
     });
     costs.fold(f64::INFINITY, f64::min)
 }

@@ -11,7 +11,8 @@ use crate::curves::Path;
 use crate::geometry::{Aabb, Pose};
 use crate::vehicle::Vehicle;
 
-use super::analytic::{AnalyticExpansion, AnalyticTail, GoalSet};
+use super::analytic::AnalyticExpansion;
+pub(crate) use super::analytic::{Connection, GoalSet};
 use super::cost::{CostModel, DriveState};
 use super::search::{Search, Stop};
 use super::{Budget, NoPath, PlanResult, Planner, Problem};
@@ -104,11 +105,11 @@ pub struct HybridAStar {
 
 /// What one search found.
 #[derive(Clone, Debug)]
-pub(crate) struct Leg {
+pub(crate) struct Leg<'a> {
     /// The path from the leg's start to its goal.
     pub path: Path,
     /// The curve that ended it.
-    pub tail: AnalyticTail,
+    pub end: Connection<'a>,
 }
 
 impl HybridAStar {
@@ -124,42 +125,35 @@ impl HybridAStar {
 
     /// The goal of `problem` with the entry straights that are free.
     pub(crate) fn goal_set(&self, problem: &Problem) -> GoalSet {
-        if !self.config.entry_straight {
-            return GoalSet::single(problem.goal);
+        let mut goal = GoalSet::single(problem.goal);
+        if self.config.entry_straight {
+            let c = &self.config;
+            goal.add_straights(problem, &c.cost, c.entry_step, c.entry_max);
         }
-        GoalSet::with_entries(
-            problem.goal,
-            problem.entry_gears(),
-            self.config.entry_step,
-            self.config.entry_max,
-            &problem.collision,
-        )
+        goal
     }
 
-    /// The cheapest free curve from `from` into `goal`, without any search.
-    pub(crate) fn connect(
+    /// The cheapest free way from `from` into `goal`, without any search.
+    pub(crate) fn connect<'a>(
         &mut self,
         problem: &Problem,
         from: Pose,
-        goal: &GoalSet,
-        bound: f64,
-    ) -> Option<(AnalyticTail, f64)> {
-        let (v, c) = (&problem.vehicle, &self.config.cost);
-        let state = DriveState::PARKED;
-        self.analytic.connect(from, state, goal, v, c, &problem.collision, bound)
+        goal: &'a GoalSet,
+    ) -> Option<Connection<'a>> {
+        self.analytic.connect(from, DriveState::PARKED, goal, problem, &self.config.cost)
     }
 
     /// Searches from `start` to `goal` within `expansions`, which is reduced by what was
     /// spent. The cost-to-go is computed only when the first curve fails.
-    pub(crate) fn leg(
+    pub(crate) fn leg<'a>(
         &mut self,
         problem: &Problem,
         start: Pose,
-        goal: &GoalSet,
+        goal: &'a GoalSet,
         expansions: &mut usize,
-    ) -> Result<Leg, NoPath> {
-        if let Some((tail, _)) = self.connect(problem, start, goal, f64::INFINITY) {
-            return Ok(Leg { path: Path::new(start, tail.segments()), tail });
+    ) -> Result<Leg<'a>, NoPath> {
+        if let Some(end) = self.connect(problem, start, goal) {
+            return Ok(Leg { path: Path::new(start, end.segments()), end });
         }
         let domain = self.domain(problem, start, goal.pose);
         self.search.begin(&self.config, problem, domain, start, goal.pose);
@@ -170,14 +164,11 @@ impl HybridAStar {
             *expansions -= 1;
             if self.search.wants_curve(node) {
                 let (pose, state) = self.search.arrival(node);
-                let (v, c) = (&problem.vehicle, &self.config.cost);
-                let bound = f64::INFINITY;
-                let tail =
-                    self.analytic.connect(pose, state, goal, v, c, &problem.collision, bound);
-                if let Some((tail, _)) = tail {
+                let end = self.analytic.connect(pose, state, goal, problem, &self.config.cost);
+                if let Some(end) = end {
                     let mut path = self.search.path_to(node);
-                    path.extend(tail.segments());
-                    return Ok(Leg { path, tail });
+                    path.extend(end.segments());
+                    return Ok(Leg { path, end });
                 }
             }
             self.search.expand(node, &self.config, problem);
@@ -211,7 +202,9 @@ impl Planner for HybridAStar {
         let leg = self.leg(problem, problem.start, &goal, &mut left);
         let expansions = budget.max_expansions - left;
         match leg {
-            Ok(leg) => PlanResult::certified(problem, leg.path, Some(leg.tail), expansions),
+            Ok(Leg { path, end }) => {
+                PlanResult::certified(problem, path, Some(end.tail()), expansions)
+            }
             Err(reason) => PlanResult::none(reason, expansions),
         }
     }
