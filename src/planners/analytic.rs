@@ -8,7 +8,7 @@
 use crate::curves::reeds_shepp::{self, Word};
 use crate::curves::Segment;
 use crate::geometry::Pose;
-use crate::vehicle::{Gear, Vehicle};
+use crate::vehicle::Vehicle;
 
 use super::Problem;
 use super::cost::{CostModel, DriveState};
@@ -50,8 +50,7 @@ pub(crate) struct Entry {
     pub preparatory: bool,
     /// Cost of `rest` when arriving in its gear with its steering.
     cost: f64,
-    /// Gear and steering that `rest` begins with.
-    first: Option<(Gear, f64)>,
+    departure: DriveState,
 }
 
 impl Entry {
@@ -62,33 +61,42 @@ impl Entry {
         vehicle: &Vehicle,
         model: &CostModel,
     ) -> Self {
-        let first = rest.first().map(|s| (s.gear(), vehicle.steer(s.curvature)));
-        let mut state = first.map_or(DriveState::PARKED, |(gear, steer)| DriveState {
-            gear: Some(gear),
-            steer,
+        let departure = rest.first().map_or(DriveState::PARKED, |s| DriveState {
+            gear: Some(s.gear()),
+            steer: vehicle.steer(s.curvature),
         });
+        let mut state = departure;
         let mut cost = 0.0;
         for s in &rest {
             let (c, next) = model.segment(state, s.length, vehicle.steer(s.curvature));
             cost += c;
             state = next;
         }
-        Self { pose, rest, preparatory, cost, first }
+        Self { pose, rest, preparatory, cost, departure }
     }
 
-    /// Cost of driving `rest` on arrival in `state`.
-    fn cost_from(&self, state: DriveState, model: &CostModel) -> f64 {
-        let Some((gear, steer)) = self.first else { return 0.0 };
-        let change = if state.gear.is_some_and(|g| g != gear) { model.gear_change } else { 0.0 };
-        self.cost + change + model.steer_change * (steer - state.steer).abs()
+    /// Cost of `rest` when arriving in its gear with its steering.
+    pub fn cost(&self) -> f64 {
+        self.cost
+    }
+
+    /// Gear and steering that `rest` begins with.
+    pub fn departure(&self) -> DriveState {
+        self.departure
     }
 }
 
 impl GoalSet {
     /// Only the pose itself.
     pub fn single(pose: Pose) -> Self {
-        let goal = Entry { pose, rest: Vec::new(), preparatory: false, cost: 0.0, first: None };
+        let (rest, departure) = (Vec::new(), DriveState::PARKED);
+        let goal = Entry { pose, rest, preparatory: false, cost: 0.0, departure };
         Self { pose, entries: vec![goal] }
+    }
+
+    /// The poses to end a curve at; the goal itself comes first.
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
     }
 
     /// Adds every free entry straight into the goal of `problem`, `step` metres apart and
@@ -130,7 +138,7 @@ pub(super) struct AnalyticExpansion {
 struct Candidate {
     cost: f64,
     word: Word,
-    entry: usize,
+    target: usize,
 }
 
 /// A free way into a goal set: a curve, then the rest of an entry.
@@ -142,6 +150,8 @@ pub(crate) struct Connection<'a> {
     pub word: Word,
     /// Where the curve ends and what follows.
     pub entry: &'a Entry,
+    /// Its index in the goal set.
+    pub entry_index: usize,
 }
 
 impl Connection<'_> {
@@ -150,46 +160,71 @@ impl Connection<'_> {
         self.word.segments().iter().chain(&self.entry.rest).copied()
     }
 
-    /// The preparatory pose on the way: the learnt one, or else where the curve begins.
-    pub fn preparatory_pose(&self) -> Pose {
-        if self.entry.preparatory { self.entry.pose } else { self.from }
-    }
-
-    /// The curve as a tail; the entry must be a straight.
+    /// The curve as a tail; the entry must not be preparatory.
     pub fn tail(&self) -> AnalyticTail {
-        let entry = if self.entry.preparatory { None } else { self.entry.rest.first() };
-        AnalyticTail { from: self.from, word: self.word, entry: entry.map_or(0.0, |s| s.length) }
+        let entry = self.entry.rest.first().map_or(0.0, |s| s.length);
+        AnalyticTail { from: self.from, word: self.word, entry }
     }
 }
 
 impl AnalyticExpansion {
     /// The cheapest free way from the free pose `from` into `goal`.
-    ///
-    /// `state`: gear and steering on arrival at `from`.
     pub fn connect<'a>(
         &mut self,
         from: Pose,
-        state: DriveState,
         goal: &'a GoalSet,
         problem: &Problem,
         model: &CostModel,
     ) -> Option<Connection<'a>> {
         self.candidates.clear();
-        let vehicle = &problem.vehicle;
-        let radius = vehicle.turning_radius();
         for (i, entry) in goal.entries.iter().enumerate() {
-            self.words.clear();
-            reeds_shepp::words(from, entry.pose, radius, &mut self.words);
-            for &word in &self.words {
-                let (cost, arrival) = curve_cost(&word, state, vehicle, model);
-                let cost = cost + entry.cost_from(arrival, model);
-                self.candidates.push(Candidate { cost, word, entry: i });
-            }
+            self.add(from, entry.pose, entry.departure, entry.cost, i, &problem.vehicle, model);
         }
+        let c = self.cheapest_free(from, problem)?;
+        let (entry, entry_index) = (&goal.entries[c.target], c.target);
+        Some(Connection { from, word: c.word, entry, entry_index })
+    }
+
+    /// The cheapest free curve from the free pose `from` to `to`, where the way goes on with
+    /// `departure`.
+    pub fn curve(
+        &mut self,
+        from: Pose,
+        to: Pose,
+        departure: DriveState,
+        problem: &Problem,
+        model: &CostModel,
+    ) -> Option<Word> {
+        self.candidates.clear();
+        self.add(from, to, departure, 0.0, 0, &problem.vehicle, model);
+        self.cheapest_free(from, problem).map(|c| c.word)
+    }
+
+    /// Adds all words to one target as candidates.
+    #[expect(clippy::too_many_arguments, reason = "private; one call per target")]
+    fn add(
+        &mut self,
+        from: Pose,
+        to: Pose,
+        departure: DriveState,
+        rest: f64,
+        target: usize,
+        vehicle: &Vehicle,
+        model: &CostModel,
+    ) {
+        self.words.clear();
+        reeds_shepp::words(from, to, vehicle.turning_radius(), &mut self.words);
+        for &word in &self.words {
+            let (cost, arrival) = curve_cost(&word, DriveState::PARKED, vehicle, model);
+            let cost = cost + model.change(arrival, departure) + rest;
+            self.candidates.push(Candidate { cost, word, target });
+        }
+    }
+
+    fn cheapest_free(&mut self, from: Pose, problem: &Problem) -> Option<&Candidate> {
         self.candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         let world = &problem.collision;
-        let free = self.candidates.iter().find(|c| world.segments_are_free(from, c.word.segments()));
-        free.map(|c| Connection { from, word: c.word, entry: &goal.entries[c.entry] })
+        self.candidates.iter().find(|c| world.segments_are_free(from, c.word.segments()))
     }
 }
 
@@ -226,7 +261,7 @@ pub(super) fn least_curve_cost(
 ) -> f64 {
     words.clear();
     reeds_shepp::words(from, to, vehicle.turning_radius(), words);
-    // Gear and wheels on arrival are unknown: neither is charged.
+    // Straightening the wheels at the start is not charged: a lower bound for any state.
     let costs = words.iter().map(|w| {
         let steer = w.segments().first().map_or(0.0, |s| vehicle.max_steer * sign_or_zero(s.curvature));
         curve_cost(w, DriveState { gear: None, steer }, vehicle, model).0

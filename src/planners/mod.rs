@@ -14,7 +14,7 @@ mod problem;
 mod search;
 
 pub use analytic::AnalyticTail;
-pub use hybrid_astar::{HybridAStar, HybridAStarConfig};
+pub use hybrid_astar::{HybridAStar, HybridAStarConfig, Resolution};
 pub use problem::{Problem, ProblemError};
 
 use crate::curves::Path;
@@ -46,8 +46,6 @@ pub struct PlanResult {
     pub outcome: Result<Path, NoPath>,
     /// Node expansions spent.
     pub expansions: usize,
-    /// The Reeds-Shepp tail that reached the goal, when one did.
-    pub tail: Option<AnalyticTail>,
     /// What N3P took for the spot and did with it; `None` for plain planners.
     pub guidance: Option<Guidance>,
 }
@@ -55,12 +53,7 @@ pub struct PlanResult {
 impl PlanResult {
     /// A result with `path`, which must pass the exact check from the start to the goal:
     /// the certificate every planner's path leaves with.
-    pub fn certified(
-        problem: &Problem,
-        path: Path,
-        tail: Option<AnalyticTail>,
-        expansions: usize,
-    ) -> Self {
+    pub fn certified(problem: &Problem, path: Path, expansions: usize) -> Self {
         /// End poses may differ from the goal by accumulated rounding only.
         const END_TOLERANCE: f64 = 1e-6;
         let end = path.end();
@@ -68,7 +61,7 @@ impl PlanResult {
             && signed_angle(end.heading, problem.goal.heading).abs() < END_TOLERANCE
             && path.start.distance(problem.start) < END_TOLERANCE;
         if arrives && problem.collision.path_is_free(&path) {
-            Self { outcome: Ok(path), expansions, tail, guidance: None }
+            Self { outcome: Ok(path), expansions, guidance: None }
         } else {
             Self::none(NoPath::Uncertified, expansions)
         }
@@ -76,7 +69,7 @@ impl PlanResult {
 
     /// A result without path.
     pub fn none(reason: NoPath, expansions: usize) -> Self {
-        Self { outcome: Err(reason), expansions, tail: None, guidance: None }
+        Self { outcome: Err(reason), expansions, guidance: None }
     }
 }
 

@@ -1,6 +1,6 @@
-//! The non-holonomic half of the heuristic: least Reeds-Shepp cost to the goal, tabulated.
+//! The non-holonomic half of the heuristic: least Reeds-Shepp cost from the start, tabulated.
 //!
-//! Depends on the goal-relative pose only, so the table serves every problem of one
+//! Depends on the start-relative pose only, so the table serves every problem of one
 //! vehicle. Entries are computed when first asked for, each at its bin's centre: the value
 //! never depends on which problem asked.
 
@@ -19,7 +19,7 @@ const HALF: i32 = 50;
 const SIDE: usize = 2 * HALF as usize + 1;
 const HEADINGS: usize = 72;
 
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct NonHolonomic {
     vehicle: Option<Vehicle>,
     table: Vec<f32>,
@@ -27,10 +27,6 @@ pub(super) struct NonHolonomic {
 }
 
 impl NonHolonomic {
-    pub fn new() -> Self {
-        Self { vehicle: None, table: Vec::new(), words: Vec::new() }
-    }
-
     /// Forgets the table when the vehicle is another one.
     pub fn reset(&mut self, vehicle: &Vehicle) {
         if self.vehicle.as_ref() != Some(vehicle) {
@@ -40,7 +36,7 @@ impl NonHolonomic {
         }
     }
 
-    /// Least cost from `pose`, given in the goal's frame, to the goal.
+    /// Least cost from the start to `pose`, given in the start's frame.
     pub fn cost(&mut self, pose: Pose, vehicle: &Vehicle, model: &CostModel) -> f64 {
         // Mirror symmetry: only y ≥ 0 is stored.
         let (y, heading) =
@@ -48,9 +44,9 @@ impl NonHolonomic {
         let (ix, iy) = ((pose.x * PER_METRE).round(), (y * PER_METRE).round());
         let turn = (heading / TAU).rem_euclid(1.0);
         let ih = (turn * HEADINGS as f64 + 0.5) as usize % HEADINGS;
-        let goal = Pose::default();
+        let start = Pose::default();
         if ix.abs() > f64::from(HALF) || iy > f64::from(HALF) {
-            return least_curve_cost(pose, goal, vehicle, model, &mut self.words);
+            return least_curve_cost(start, pose, vehicle, model, &mut self.words);
         }
         let index = ((iy as usize * SIDE) + (ix as i32 + HALF) as usize) * HEADINGS + ih;
         let stored = self.table[index];
@@ -58,7 +54,7 @@ impl NonHolonomic {
             return f64::from(stored);
         }
         let center = Pose::new(ix / PER_METRE, iy / PER_METRE, ih as f64 / HEADINGS as f64 * TAU);
-        let cost = least_curve_cost(center, goal, vehicle, model, &mut self.words) as f32;
+        let cost = least_curve_cost(start, center, vehicle, model, &mut self.words) as f32;
         self.table[index] = cost;
         f64::from(cost)
     }

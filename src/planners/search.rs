@@ -1,16 +1,22 @@
 //! The best-first search of Hybrid A*: open queue, node arena, expansion.
+//!
+//! The search runs *from the goal*: driving is reversible, and near the goal space is
+//! tight. A node's motion leads forward in time from the node to its parent, so that the
+//! way from a node to the goal is read off by walking up to the root. What is estimated is
+//! the cost from the start to the node.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use crate::curves::{Path, Segment};
+use crate::curves::Segment;
 use crate::geometry::{Aabb, Pose, wrap_angle};
 use crate::vehicle::{Gear, Vehicle};
 use crate::world::collision::Sweep;
 
+use super::analytic::GoalSet;
 use super::cost::{CostModel, DriveState};
 use super::cost_to_go::CostToGo;
-use super::hybrid_astar::{HybridAStarConfig, inscribed_radius};
+use super::hybrid_astar::{HybridAStarConfig, Resolution, inscribed_radius};
 use super::lattice::Lattice;
 use super::nonholonomic::NonHolonomic;
 use super::Problem;
@@ -18,7 +24,7 @@ use super::Problem;
 /// Why the queue ran empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stop {
-    /// The cost-to-go does not reach the start.
+    /// The wave from the start never reaches the goal.
     Enclosed,
     /// Everything reachable was expanded.
     Exhausted,
@@ -27,16 +33,19 @@ pub(super) enum Stop {
 /// Index of a node in the arena.
 pub(super) type NodeIndex = u32;
 
-/// No parent, or no primitive: the root.
+/// In place of a primitive: the node is a root.
 const ROOT: u32 = u32::MAX;
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
     pose: Pose,
+    /// Cost from here to the goal.
     cost: f32,
-    /// Heuristic cost-to-go.
-    to_go: f32,
+    /// Estimated cost from the start to here.
+    to_come: f32,
+    /// The node that `primitive` leads to; for a root the index of its goal-set entry.
     parent: NodeIndex,
+    /// Index of the motion; `ROOT` for a root.
     primitive: u32,
 }
 
@@ -61,15 +70,19 @@ impl PartialOrd for Open {
     }
 }
 
-/// A motion primitive: its sweep, and the cost of driving it.
+/// A motion primitive.
 #[derive(Clone, Debug)]
 struct Primitive {
+    /// The motion, forward in time.
+    segment: Segment,
+    /// What the reversed motion sweeps.
     sweep: Sweep,
+    /// Its steering angle, radians.
     steer: f64,
 }
 
 /// One search at a time; buffers are reused between searches.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Search {
     nodes: Vec<Node>,
     open: BinaryHeap<Open>,
@@ -77,79 +90,70 @@ pub(super) struct Search {
     cost_to_go: CostToGo,
     nonholonomic: NonHolonomic,
     primitives: Vec<Primitive>,
-    goal: Pose,
+    start: Pose,
     weight: f32,
     enclosed: bool,
     /// Expansions since a curve was last tried.
     since_curve: u32,
 }
 
-impl Default for Search {
-    fn default() -> Self {
-        Self {
-            nodes: Vec::new(),
-            open: BinaryHeap::new(),
-            lattice: Lattice::default(),
-            cost_to_go: CostToGo::default(),
-            nonholonomic: NonHolonomic::new(),
-            primitives: Vec::new(),
-            goal: Pose::default(),
-            weight: 1.0,
-            enclosed: false,
-            since_curve: 0,
-        }
-    }
-}
-
 impl Search {
-    /// Starts a search from `start` to `goal` within `domain`.
+    /// Starts a search from `goal` to `start` within `domain`.
     pub fn begin(
         &mut self,
         config: &HybridAStarConfig,
+        resolution: &Resolution,
         problem: &Problem,
         domain: Aabb,
         start: Pose,
-        goal: Pose,
+        goal: &GoalSet,
     ) {
         let vehicle = &problem.vehicle;
-        self.goal = goal;
+        self.start = start;
         self.weight = config.heuristic_weight as f32;
         self.nodes.clear();
         self.open.clear();
         self.since_curve = 0;
-        self.lattice.reset(&domain, config.cell, config.headings);
+        self.lattice.reset(&domain, resolution.cell, resolution.headings);
         self.nonholonomic.reset(vehicle);
         let radius = inscribed_radius(vehicle);
         let cell = config.cost_to_go_cell;
-        self.cost_to_go.reset(&domain, cell, radius, &problem.obstacles, goal);
-        self.prepare_primitives(config, vehicle, problem.collision.footprint());
-        let to_go = self.heuristic(start, vehicle, &config.cost);
-        self.enclosed = !to_go.is_finite();
+        self.cost_to_go.reset(&domain, cell, radius, &problem.obstacles, start);
+        self.prepare_primitives(resolution, vehicle, problem.collision.footprint());
+        self.enclosed = !self.cost_to_go.distance(goal.pose.position()).is_finite();
         if self.enclosed {
             return;
         }
-        if let Some(state) = self.lattice.state(start) {
-            self.lattice.set_cost(state, 0.0);
+        for (i, entry) in goal.entries().iter().enumerate() {
+            let to_come = self.heuristic(entry.pose, vehicle, &config.cost);
+            let Some(state) = self.lattice.state(entry.pose) else { continue };
+            let cost = entry.cost() as f32;
+            if to_come.is_finite() && cost < self.lattice.cost(state) {
+                self.lattice.set_cost(state, cost);
+                let parent = i as NodeIndex;
+                self.push(Node { pose: entry.pose, cost, to_come, parent, primitive: ROOT });
+            }
         }
-        self.push(Node { pose: start, cost: 0.0, to_go, parent: ROOT, primitive: ROOT });
     }
 
     fn prepare_primitives(
         &mut self,
-        config: &HybridAStarConfig,
+        resolution: &Resolution,
         vehicle: &Vehicle,
         footprint: &Aabb,
     ) {
         self.primitives.clear();
-        let half = (config.steers / 2) as i32;
+        let half = (resolution.steers / 2) as i32;
         for gear in [Gear::Forward, Gear::Backward] {
             for i in -half..=half {
                 let steer = vehicle.max_steer * f64::from(i) / f64::from(half);
                 let segment = Segment {
                     curvature: steer.tan() / vehicle.wheelbase,
-                    length: gear.sign() * config.step,
+                    length: gear.sign() * resolution.step,
                 };
-                self.primitives.push(Primitive { sweep: Sweep::new(footprint, segment), steer });
+                // Swept in reverse: from the node it leads to.
+                let sweep = Sweep::new(footprint, segment.reversed());
+                self.primitives.push(Primitive { segment, sweep, steer });
             }
         }
     }
@@ -172,78 +176,88 @@ impl Search {
         if self.enclosed { Stop::Enclosed } else { Stop::Exhausted }
     }
 
-    /// Whether a curve to the goal should be tried from `node`: rarely far from the goal,
+    /// Whether a curve from the start to `node` should be tried: rarely far from the start,
     /// always close to it.
     pub fn wants_curve(&mut self, node: NodeIndex) -> bool {
         self.since_curve += 1;
-        let wants = self.since_curve as f32 * 4.0 >= self.nodes[node as usize].to_go;
+        let wants = self.since_curve as f32 * 4.0 >= self.nodes[node as usize].to_come;
         if wants {
             self.since_curve = 0;
         }
         wants
     }
 
-    /// The pose of `node`, and the gear and steering it was reached with.
-    pub fn arrival(&self, node: NodeIndex) -> (Pose, DriveState) {
-        let n = &self.nodes[node as usize];
-        let state = self.primitives.get(n.primitive as usize).map_or(DriveState::PARKED, |p| {
-            DriveState { gear: Some(p.sweep.segment().gear()), steer: p.steer }
-        });
-        (n.pose, state)
+    /// The pose of `node`.
+    pub fn pose(&self, node: NodeIndex) -> Pose {
+        self.nodes[node as usize].pose
     }
 
-    /// Generates the successors of `node`.
-    pub fn expand(&mut self, node: NodeIndex, config: &HybridAStarConfig, problem: &Problem) {
+    /// The gear and steering with which the way from `node` to the goal begins.
+    pub fn departure(&self, node: NodeIndex, goal: &GoalSet) -> DriveState {
+        let n = &self.nodes[node as usize];
+        match self.primitives.get(n.primitive as usize) {
+            Some(p) => DriveState { gear: Some(p.segment.gear()), steer: p.steer },
+            None => goal.entries()[n.parent as usize].departure(),
+        }
+    }
+
+    /// Generates the predecessors of `node`.
+    pub fn expand(
+        &mut self,
+        node: NodeIndex,
+        goal: &GoalSet,
+        config: &HybridAStarConfig,
+        problem: &Problem,
+    ) {
         let parent = self.nodes[node as usize];
-        let (_, state) = self.arrival(node);
+        let state = self.departure(node, goal);
         for i in 0..self.primitives.len() {
             let p = &self.primitives[i];
-            let segment = p.sweep.segment();
-            let end = segment.end(parent.pose);
-            let end = Pose { heading: wrap_angle(end.heading), ..end };
-            let (step_cost, _) = config.cost.segment(state, segment.length, p.steer);
+            let pose = p.sweep.segment().end(parent.pose);
+            let pose = Pose { heading: wrap_angle(pose.heading), ..pose };
+            // Costs of changes are symmetric: the state after may stand for the one before.
+            let (step_cost, _) = config.cost.segment(state, p.segment.length, p.steer);
             let cost = parent.cost + step_cost as f32;
-            let Some(lattice_state) = self.lattice.state(end) else { continue };
+            let Some(lattice_state) = self.lattice.state(pose) else { continue };
             if cost >= self.lattice.cost(lattice_state)
                 || !problem.collision.sweep_is_free(parent.pose, &p.sweep)
             {
                 continue;
             }
-            let to_go = self.heuristic(end, &problem.vehicle, &config.cost);
-            if !to_go.is_finite() {
+            let to_come = self.heuristic(pose, &problem.vehicle, &config.cost);
+            if !to_come.is_finite() {
                 continue;
             }
             self.lattice.set_cost(lattice_state, cost);
-            self.push(Node { pose: end, cost, to_go, parent: node, primitive: i as u32 });
+            self.push(Node { pose, cost, to_come, parent: node, primitive: i as u32 });
         }
     }
 
     fn push(&mut self, node: Node) {
         let index = self.nodes.len() as NodeIndex;
         self.nodes.push(node);
-        self.open.push(Open { f: node.cost + self.weight * node.to_go, node: index });
+        self.open.push(Open { f: node.cost + self.weight * node.to_come, node: index });
     }
 
-    /// The larger of the two cost-to-go heuristics.
+    /// The larger of the two estimates of the cost from the start to `pose`.
     fn heuristic(&mut self, pose: Pose, vehicle: &Vehicle, model: &CostModel) -> f32 {
         let per_metre = model.forward.min(model.backward);
         let among_obstacles = self.cost_to_go.distance(pose.position()) * per_metre;
         if !among_obstacles.is_finite() {
             return f32::INFINITY;
         }
-        let curve = self.nonholonomic.cost(self.goal.relative(pose), vehicle, model);
+        let curve = self.nonholonomic.cost(self.start.relative(pose), vehicle, model);
         among_obstacles.max(curve) as f32
     }
 
-    /// The path from the root to `node`.
-    pub fn path_to(&self, node: NodeIndex) -> Path {
+    /// The motions from `node` to the goal, in driving order, and the root's goal-set entry.
+    pub fn way(&self, node: NodeIndex) -> (Vec<Segment>, usize) {
         let mut segments = Vec::new();
         let mut n = &self.nodes[node as usize];
-        while n.parent != ROOT {
-            segments.push(self.primitives[n.primitive as usize].sweep.segment());
+        while n.primitive != ROOT {
+            segments.push(self.primitives[n.primitive as usize].segment);
             n = &self.nodes[n.parent as usize];
         }
-        segments.reverse();
-        Path::new(n.pose, segments)
+        (segments, n.parent as usize)
     }
 }

@@ -107,7 +107,8 @@ impl GuidedPlanner {
         let before = *left;
         let leg = self.hars.leg(problem, problem.start, &goal, left)?;
         let route = if *left == before { Route::Direct } else { Route::Searched };
-        let preparatory = Some(leg.end.preparatory_pose());
+        let entry = &goal.entries()[leg.entry];
+        let preparatory = entry.preparatory.then_some(entry.pose);
         let guidance = Guidance { abstraction: found.first().copied(), preparatory, route };
         Ok((leg.path, guidance))
     }
@@ -175,7 +176,7 @@ impl Planner for GuidedPlanner {
         let expansions = budget.max_expansions - left;
         match planned {
             Ok((path, guidance)) => {
-                let result = PlanResult::certified(problem, path, None, expansions);
+                let result = PlanResult::certified(problem, path, expansions);
                 PlanResult { guidance: Some(guidance), ..result }
             }
             Err(reason) => PlanResult::none(reason, expansions),
