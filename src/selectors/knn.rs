@@ -177,9 +177,8 @@ impl CellPoints {
         /// Far above the rounding of a sum of four squares in single precision (2e-7).
         const ROUNDING: f64 = 1e-5;
         let exact = |i: usize| (KnnSelector::distance_sq(&self.points[i], query), i);
-        let by_distance = |a: &(f64, usize), b: &(f64, usize)| {
-            a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1))
-        };
+        let by_distance =
+            |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1));
         if n.get() < self.points.len() {
             let found = self
                 .tree

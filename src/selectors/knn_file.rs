@@ -181,8 +181,8 @@ impl KnnFile {
         let at = self.sections[kind].poses + POSE_BYTES * sample;
         let bytes = &self.map[at..at + POSE_BYTES];
         // The sign sits in the third byte: place the three above an empty one and shift.
-        let v = [0, 3, 6]
-            .map(|i| i32::from_le_bytes([0, bytes[i], bytes[i + 1], bytes[i + 2]]) >> 8);
+        let v =
+            [0, 3, 6].map(|i| i32::from_le_bytes([0, bytes[i], bytes[i + 1], bytes[i + 2]]) >> 8);
         pose(v, self.header.extent, POSE_STEPS)
     }
 }

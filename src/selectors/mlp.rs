@@ -73,7 +73,8 @@ struct VersionOnly {
 ///
 /// Panics when `weights` are not those of [`LAYERS`].
 pub fn encode(header: &MlpHeader, weights: &[LayerWeights]) -> Vec<u8> {
-    let bytes = |values: &[f32]| -> Vec<u8> { values.iter().flat_map(|v| v.to_le_bytes()).collect() };
+    let bytes =
+        |values: &[f32]| -> Vec<u8> { values.iter().flat_map(|v| v.to_le_bytes()).collect() };
     let mut tensors: Vec<(String, Vec<usize>, Vec<u8>)> = Vec::new();
     for (n, (layer, size)) in weights.iter().zip(LAYERS.windows(2)).enumerate() {
         tensors.push((name(n, "bias"), vec![size[1]], bytes(&layer.bias)));
@@ -117,9 +118,7 @@ impl MlpSelector {
     /// Reads and checks one network.
     pub fn load(path: &Path) -> Result<Self, ArtefactError> {
         let mut bytes = Vec::new();
-        artefact::open(path)?
-            .read_to_end(&mut bytes)
-            .map_err(|e| Fault::Unreadable(e).of(path))?;
+        artefact::open(path)?.read_to_end(&mut bytes).map_err(|e| Fault::Unreadable(e).of(path))?;
         let (header, weights) = decode(&bytes).map_err(|fault| fault.of(path))?;
         let network = Network::new(&weights);
         Ok(Self { networks: vec![Trained { path: path.to_owned(), header, network }] })
@@ -213,8 +212,7 @@ fn decode(bytes: &[u8]) -> Result<(MlpHeader, Vec<LayerWeights>), Fault> {
     if sum != artefact::hex(&artefact::sha256(&[json.as_bytes(), &bytes[data_at..]])) {
         return Err(Fault::Checksum);
     }
-    let header: MlpHeader =
-        serde_json::from_str(json).map_err(|e| Fault::Header(e.to_string()))?;
+    let header: MlpHeader = serde_json::from_str(json).map_err(|e| Fault::Header(e.to_string()))?;
     check_header(&header).map_err(Fault::Header)?;
     let tensors = SafeTensors::deserialize(bytes).map_err(|e| Fault::Header(e.to_string()))?;
     let layers = LAYERS.windows(2).enumerate().map(|(n, size)| {
@@ -288,7 +286,8 @@ fn check_header(header: &MlpHeader) -> Result<(), String> {
 
 fn tensor(file: &SafeTensors, name: &str, shape: &[usize]) -> Result<Vec<f32>, Fault> {
     let expected = format!("F32 {shape:?}");
-    let wrong = |got: String| Fault::Shape { tensor: name.to_owned(), expected: expected.clone(), got };
+    let wrong =
+        |got: String| Fault::Shape { tensor: name.to_owned(), expected: expected.clone(), got };
     let view = file.tensor(name).map_err(|_| wrong("nothing".to_owned()))?;
     if view.dtype() != Dtype::F32 || view.shape() != shape {
         return Err(wrong(format!("{:?} {:?}", view.dtype(), view.shape())));

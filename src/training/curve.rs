@@ -36,7 +36,10 @@ fn draw(
         .margin(12)
         .x_label_area_size(40)
         .y_label_area_size(70)
-        .build_cartesian_2d(1..losses.len().max(2), (low.min(high) * 0.8..high * 1.25).log_scale())?;
+        .build_cartesian_2d(
+            1..losses.len().max(2),
+            (low.min(high) * 0.8..high * 1.25).log_scale(),
+        )?;
     chart.configure_mesh().x_desc("epoch").y_desc("loss").draw()?;
     let lines: [(&str, RGBColor, fn(&EpochLoss) -> f32); 2] =
         [("training", BLUE, |l| l.train), ("validation", RED, |l| l.validation)];
@@ -47,11 +50,7 @@ fn draw(
             .label(name)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 20, y)], colour));
     }
-    chart
-        .configure_series_labels()
-        .background_style(WHITE.mix(0.8))
-        .border_style(BLACK)
-        .draw()?;
+    chart.configure_series_labels().background_style(WHITE.mix(0.8)).border_style(BLACK).draw()?;
     root.present()?;
     Ok(())
 }

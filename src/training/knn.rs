@@ -41,11 +41,8 @@ pub fn train(
         let occupied = solved.chunk_by(|a, b| a.cell_index == b.cell_index).count();
         report.push((kind, solved.len(), occupied));
         headers.push(KindHeader { kind, cells, samples: solved.len() });
-        let entry = |s: &&Sample| KnnEntry {
-            cell: s.cell_index,
-            start: s.start,
-            preparatory: s.rs_start,
-        };
+        let entry =
+            |s: &&Sample| KnnEntry { cell: s.cell_index, start: s.start, preparatory: s.rs_start };
         entries.push(solved.iter().map(entry).collect::<Vec<_>>());
     }
     let header = KnnHeader {

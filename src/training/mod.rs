@@ -74,7 +74,11 @@ pub enum TrainingError {
 }
 
 /// The solved samples of a type, by cell and then by index, whatever the order of `samples`.
-fn solved(samples: &[Sample], kind: ParkingType, cells: usize) -> Result<Vec<&Sample>, TrainingError> {
+fn solved(
+    samples: &[Sample],
+    kind: ParkingType,
+    cells: usize,
+) -> Result<Vec<&Sample>, TrainingError> {
     let wanted = |s: &&Sample| s.cell.kind == kind && s.status == Status::Solved;
     let mut solved: Vec<&Sample> = samples.iter().filter(wanted).collect();
     solved.sort_by_key(|s| (s.cell_index, s.sample_index));
