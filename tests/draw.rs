@@ -17,10 +17,23 @@ fn scene(kind: ParkingType, level: Level, index: u64) -> Scene {
     generate(&GeneratorConfig::default(), &Vehicle::default(), kind, level, 5, index)
 }
 
+/// A scene somewhere in the world.
+fn placed() -> Scene {
+    let config = GeneratorConfig { world_frame: true, ..GeneratorConfig::default() };
+    generate(&config, &Vehicle::default(), ParkingType::Forward, Level::Complex, 5, 3)
+}
+
 /// Two arcs and a straight, backward in the middle.
 fn some_path(scene: &Scene) -> Path {
     let arc = |curvature, length| Segment { curvature, length };
     Path::new(scene.start, [arc(0.02, 9.0), arc(-0.2, -3.0), arc(0.1, 2.0)])
+}
+
+/// Keeps a picture to look at, when asked to.
+fn keep(name: &str, svg: &str) {
+    if let Some(dir) = std::env::var_os("N3P_PICTURES") {
+        fs::write(PathBuf::from(dir).join(format!("{name}.svg")), svg).unwrap();
+    }
 }
 
 /// Every element is closed, in order.
@@ -42,7 +55,6 @@ fn assert_well_formed(svg: &str) {
 
 #[test]
 fn a_scene_alone_is_a_picture() {
-    let keep = std::env::var_os("N3P_PICTURES").map(PathBuf::from);
     for kind in ParkingType::ALL {
         for level in Level::ALL {
             for index in 0..4 {
@@ -52,9 +64,7 @@ fn a_scene_alone_is_a_picture() {
                 assert!(svg.contains(&format!("<title>{}</title>", scene.name)));
                 assert!(!svg.contains("direction change") && !svg.contains("preparatory"));
                 assert!(svg.len() < 20_000, "{} bytes", svg.len());
-                if let Some(dir) = &keep {
-                    fs::write(dir.join(scene.name + ".svg"), svg).unwrap();
-                }
+                keep(&scene.name, &svg);
             }
         }
     }
@@ -77,17 +87,16 @@ fn everything_at_once() {
     let svg = scene_svg(&scene, &drawing);
     assert_well_formed(&svg);
     let title = "knn-n3p · 14.0 m · 2 direction changes · a &lt;remark&gt; &amp; more";
-    for part in [title, "preparatory pose", "lane taken", "forward", "backward", "5 m"] {
+    for part in [title, "preparatory pose", ">lane<", "forward", "backward", "5 m"] {
         assert!(svg.contains(part), "{part} missing");
     }
-    if let Some(dir) = std::env::var_os("N3P_PICTURES") {
-        fs::write(PathBuf::from(dir).join("everything.svg"), svg).unwrap();
-    }
+    keep("everything", &svg);
 }
 
 #[test]
 fn hostile_names_empty_lots_and_far_places() {
     let mut scene = scene(ParkingType::Parallel, Level::Easy, 0);
+    keep("placed", &scene_svg(&placed(), &Drawing::default()));
     scene.name = "</title><script>\"a\" & b\u{7}".to_owned();
     scene.obstacles.clear();
     scene.points = vec![[scene.start.x, scene.start.y + 4.0]];
@@ -109,4 +118,17 @@ fn hostile_names_empty_lots_and_far_places() {
     let still = Path::new(scene.start, []);
     let svg = scene_svg(&scene, &Drawing { path: Some(&still), ..Drawing::default() });
     assert_well_formed(&svg);
+}
+
+#[test]
+fn real_scenes_are_pictures() {
+    for folder in ["tpcap", "dlp"] {
+        let dir = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/scenes"));
+        let Ok(scenes) = Scene::read_dir(&dir.join(folder)) else { return };
+        for scene in scenes.iter().take(10) {
+            let svg = scene_svg(scene, &Drawing::default());
+            assert_well_formed(&svg);
+            keep(&scene.name, &svg);
+        }
+    }
 }

@@ -33,8 +33,10 @@ const MAP_HEIGHT: [f64; 2] = [400.0, 720.0];
 const TITLE: f64 = 58.0;
 /// Height of a line of the legend, px.
 const LEGEND_LINE: f64 = 24.0;
-/// Free space around what is shown, metres.
+/// Free space around start, goal and path, metres.
 const PADDING: f64 = 3.0;
+/// The most of it without a path, where the picture is about the surroundings.
+const PADDING_ALONE: f64 = 9.0;
 /// Distance between the points of a drawn path, metres.
 const STEP: f64 = 0.2;
 /// Distance between the drawn footprints along a path, metres.
@@ -47,8 +49,10 @@ const PREPARATORY: &str = "#8b2fc9";
 const FORWARD: &str = "#2f7de1";
 const BACKWARD: &str = "#e8710a";
 const OBSTACLE: &str = r##"fill="#aab2bd" stroke="#6b7684""##;
+const BOUNDS: &str = r##"fill="none" stroke="#b4bdc8" stroke-dasharray="6 5""##;
 const LANE: &str = r##"fill="#22c55e" fill-opacity=".13" stroke="#22a052" stroke-opacity=".6""##;
 const SPOT: &str = r##"fill="#facc15" fill-opacity=".3" stroke="#ca9a04" stroke-opacity=".7""##;
+const CHANGE: &str = r##"fill="#ffffff" stroke="#1f2933" stroke-width="2""##;
 
 /// The picture of `scene` with `drawing` on it, as one SVG document.
 pub fn scene_svg(scene: &Scene, drawing: &Drawing) -> String {
@@ -102,7 +106,15 @@ fn view(scene: &Scene, drawing: &Drawing) -> Aabb {
         drawing.path.into_iter().flat_map(|p| p.sample(STEP)).flat_map(|s| corners(s.pose)),
     );
     shown.extend(drawing.regions.iter().flatten().flat_map(|r| r.vertices().to_vec()));
-    let view = Aabb::around(shown).inflated(PADDING);
+    let view = if drawing.path.is_some() {
+        Aabb::around(shown).inflated(PADDING)
+    } else {
+        let near = Aabb::around(shown.iter().copied()).inflated(PADDING_ALONE);
+        let obstacles = scene.geometry();
+        let all = Aabb::around(obstacles.edges().map(|(a, _)| a).chain(shown));
+        let all = all.inflated(PADDING / 2.0);
+        Aabb { min: near.min.sup(&all.min), max: near.max.inf(&all.max) }
+    };
     let (w, h) = (view.max.x - view.min.x, view.max.y - view.min.y);
     let more_width = (h * WIDTH / MAP_HEIGHT[1] - w).max(0.0) / 2.0;
     let more_height = ((w + 2.0 * more_width) * MAP_HEIGHT[0] / WIDTH - h).max(0.0) / 2.0;
@@ -122,8 +134,7 @@ impl Map {
     fn scene(&mut self, scene: &Scene, drawing: &Drawing) {
         let (vehicle, view) = (&scene.vehicle, self.view);
         if let Some([x0, y0, x1, y1]) = scene.bounds {
-            let style = r##"fill="none" stroke="#cbd2d9" stroke-dasharray="6 5""##;
-            self.polygon(&Aabb::new(x0, y0, x1, y1).corners(), style);
+            self.polygon(&Aabb::new(x0, y0, x1, y1).corners(), BOUNDS);
         }
         if let Some([lane, spot]) = &drawing.regions {
             self.polygon(lane.vertices(), LANE);
@@ -240,19 +251,17 @@ impl Map {
         let y = self.scale * (self.view.max.y - self.view.min.y) - 16.0;
         let (a, b) = (16.0, 16.0 + 5.0 * self.scale);
         let (top, left, right) = (num(y - 5.0), num(a), num(b));
-        let way = format!("M{left} {top}v5H{right}v-5");
+        let middle = num((a + b) / 2.0);
+        let (box_top, box_width) = (num(y - 20.0), num(b - a + 16.0));
         self.svg += &format!(
-            r##"<path d="{way}" fill="none" stroke="#ffffff" stroke-width="5"/>
-<path d="{way}" fill="none" stroke="{INK}" stroke-width="1.5"/>
-<text x="{}" y="{}" text-anchor="middle" font-size="12" stroke="#ffffff" stroke-width="3" paint-order="stroke">5 m</text>
+            r##"<rect x="{}" y="{box_top}" width="{box_width}" height="28" rx="4" fill="#ffffff" fill-opacity=".85"/>
+<path d="M{left} {top}v5H{right}v-5" fill="none" stroke="{INK}" stroke-width="1.5"/>
+<text x="{middle}" y="{top}" text-anchor="middle" font-size="12">5 m</text>
 "##,
-            num((a + b) / 2.0),
-            num(y - 7.0),
+            num(a - 8.0),
         );
     }
 }
-
-const CHANGE: &str = r##"fill="#ffffff" stroke="#1f2933" stroke-width="2""##;
 
 fn colour(gear: Gear) -> &'static str {
     match gear {
@@ -293,10 +302,13 @@ fn legend(scene: &Scene, drawing: &Drawing) -> Vec<Entry> {
         }
     }
     if drawing.regions.is_some() {
-        entries.extend([(area(LANE), "lane taken"), (area(SPOT), "spot taken")]);
+        entries.extend([(area(LANE), "lane"), (area(SPOT), "spot")]);
     }
     if !scene.obstacles.is_empty() || !scene.points.is_empty() {
         entries.push((area(OBSTACLE), "obstacle"));
+    }
+    if scene.bounds.is_some() {
+        entries.push((area(BOUNDS), "bounds"));
     }
     entries
 }
@@ -305,7 +317,7 @@ fn legend(scene: &Scene, drawing: &Drawing) -> Vec<Entry> {
 fn place(entries: &[Entry], top: f64) -> (String, usize) {
     let (mut svg, mut x, mut line) = (String::new(), 14.0, 0);
     for (sign, what) in entries {
-        let width = 34.0 + 7.2 * what.len() as f64 + 18.0;
+        let width = 46.0 + 6.8 * what.len() as f64;
         if x + width > WIDTH {
             (x, line) = (14.0, line + 1);
         }
