@@ -1,1 +1,3 @@
 //! evaluation
+
+pub mod draw;
