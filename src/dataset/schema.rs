@@ -288,7 +288,7 @@ mod tests {
 
     #[test]
     fn start_steps_are_exact_in_f32() {
-        let p = to_step(Pose::new(-9.999, 11.0001, 1.0471));
+        let p = to_step(Pose::new(-9.999, 11.0001, 0.7777));
         for v in <[f64; 3]>::from(p) {
             assert_eq!((v / Sample::START_STEP).fract(), 0.0);
             assert_eq!(f64::from(v as f32), v);
