@@ -229,12 +229,13 @@ fn mlp_learns_a_smooth_mapping_reproducibly() {
     let dir = tempfile::tempdir().unwrap();
     let cells: Vec<usize> = (0..12).collect();
     let all = samples(KIND, &cells, 60, 9);
-    for loss in [Loss::Mse, Loss::Huber] {
+    // The Huber loss is linear far out, so that it falls slower than the squared error.
+    for (loss, fall) in [(Loss::Mse, 10.0), (Loss::Huber, 5.0)] {
         let config = MlpConfig { loss, ..quick(25) };
         let path = dir.path().join("mlp-parallel.safetensors");
         let log = train_mlp(&all, &config, &path);
         let (first, last) = (log.losses[0].train, log.losses[log.losses.len() - 1].train);
-        assert!(last < first / 10.0, "{loss:?}: {first} → {last}");
+        assert!(last < first / fall, "{loss:?}: {first} → {last}");
         assert!(log.validation.position_median_m < 0.3, "{:?}", log.validation);
         assert!(log.validation_rows > 0 && log.best_epoch > 0);
         let again = dir.path().join("again.safetensors");
