@@ -34,7 +34,7 @@ impl AnalyticTail {
 /// A goal pose, and the poses from which the rest of the way into it is known.
 #[derive(Clone, Debug)]
 pub(crate) struct GoalSet {
-    /// The goal itself.
+    /// The goal itself, or its stand-in where only preparatory poses are meant.
     pub pose: Pose,
     entries: Vec<Entry>,
 }
@@ -94,7 +94,14 @@ impl GoalSet {
         Self { pose, entries: vec![goal] }
     }
 
-    /// The poses to end a curve at; the goal itself comes first.
+    /// Only the preparatory poses of this set; `None` without any.
+    pub fn only_preparatory(&self) -> Option<GoalSet> {
+        let entries: Vec<Entry> = self.entries.iter().filter(|e| e.preparatory).cloned().collect();
+        let pose = entries.first()?.pose;
+        Some(GoalSet { pose, entries })
+    }
+
+    /// The poses to end a curve at.
     pub fn entries(&self) -> &[Entry] {
         &self.entries
     }

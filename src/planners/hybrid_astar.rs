@@ -17,7 +17,7 @@ use crate::geometry::{Aabb, Pose};
 use crate::vehicle::Vehicle;
 
 use super::analytic::{AnalyticExpansion, AnalyticTail};
-pub(crate) use super::analytic::{Connection, GoalSet};
+pub(crate) use super::analytic::{Connection, Entry, GoalSet};
 use super::cost::CostModel;
 use super::search::{Search, Stop};
 use super::{Budget, NoPath, PlanResult, Planner, Problem};
@@ -126,7 +126,7 @@ impl HybridAStarConfig {
 #[derive(Debug)]
 pub struct HybridAStar {
     config: HybridAStarConfig,
-    search: Search,
+    queue: Search,
     analytic: AnalyticExpansion,
 }
 
@@ -142,7 +142,7 @@ pub(crate) struct Leg {
 impl HybridAStar {
     /// A planner with `config`; buffers grow at first use.
     pub fn new(config: HybridAStarConfig) -> Self {
-        Self { config, search: Search::default(), analytic: AnalyticExpansion::default() }
+        Self { config, queue: Search::default(), analytic: AnalyticExpansion::default() }
     }
 
     /// The settings.
@@ -179,9 +179,26 @@ impl HybridAStar {
         goal: &GoalSet,
         expansions: &mut usize,
     ) -> Result<Leg, NoPath> {
-        if let Some(c) = self.connect(problem, start, goal) {
-            return Ok(Leg { path: Path::new(start, c.segments()), entry: c.entry_index });
+        match self.direct(problem, start, goal) {
+            Some(leg) => Ok(leg),
+            None => self.search(problem, start, goal, expansions),
         }
+    }
+
+    /// A leg that is one curve and the rest of an entry.
+    pub(crate) fn direct(&mut self, problem: &Problem, start: Pose, goal: &GoalSet) -> Option<Leg> {
+        let c = self.connect(problem, start, goal)?;
+        Some(Leg { path: Path::new(start, c.segments()), entry: c.entry_index })
+    }
+
+    /// [`HybridAStar::leg`] where no curve leads from `start` to `goal` directly.
+    pub(crate) fn search(
+        &mut self,
+        problem: &Problem,
+        start: Pose,
+        goal: &GoalSet,
+        expansions: &mut usize,
+    ) -> Result<Leg, NoPath> {
         let mut result = Err(NoPath::BudgetSpent);
         for (i, resolution) in self.config.resolutions.into_iter().enumerate() {
             // Finer lattices are left their share even when a coarse one goes on and on.
@@ -207,26 +224,26 @@ impl HybridAStar {
         expansions: &mut usize,
     ) -> Result<Leg, NoPath> {
         let domain = self.domain(problem, start, goal.pose);
-        self.search.begin(&self.config, resolution, problem, domain, start, goal);
-        while let Some(node) = self.search.pop() {
+        self.queue.begin(&self.config, resolution, problem, domain, start, goal);
+        while let Some(node) = self.queue.pop() {
             if *expansions == 0 {
                 return Err(NoPath::BudgetSpent);
             }
             *expansions -= 1;
-            if self.search.wants_curve(node) {
-                let departure = self.search.departure(node, goal);
-                let (to, model) = (self.search.pose(node), &self.config.cost);
+            if self.queue.wants_curve(node) {
+                let departure = self.queue.departure(node, goal);
+                let (to, model) = (self.queue.pose(node), &self.config.cost);
                 if let Some(word) = self.analytic.curve(start, to, departure, problem, model) {
-                    let (way, entry) = self.search.way(node);
+                    let (way, entry) = self.queue.way(node);
                     let mut path = Path::new(start, word.segments().iter().copied());
                     path.extend(way);
                     path.extend(goal.entries()[entry].rest.iter().copied());
                     return Ok(Leg { path, entry });
                 }
             }
-            self.search.expand(node, goal, &self.config, problem);
+            self.queue.expand(node, goal, &self.config, problem);
         }
-        Err(match self.search.stop() {
+        Err(match self.queue.stop() {
             Stop::Enclosed => NoPath::Enclosed,
             Stop::Exhausted => NoPath::Exhausted,
         })

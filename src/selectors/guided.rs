@@ -2,16 +2,15 @@
 //!
 //! [`GuidedPlanner::paper`] is the paper's Algorithm 1: abstraction → cell → one pose →
 //! HARS to the pose → HARS from the pose to the goal. [`GuidedPlanner::ranked`] is ours:
-//! several ranked poses whose curve to the goal is free join the goal set of one search,
-//! so that usually two Reeds-Shepp curves are the whole plan, without any search and
-//! without its heuristic; and where they are not, the search has every chance plain HARS
-//! has. Either way the path leaves certified by the exact swept check.
+//! several ranked poses whose curve to the goal is free; usually two Reeds-Shepp curves
+//! are the whole plan, without any search and without its heuristic. Where they are not, one
+//! search goes to all of these poses, and full HARS is the last resort. Either way the path leaves certified by the exact swept check.
 
 use std::sync::Arc;
 
 use crate::curves::{Path, Segment};
 use crate::geometry::{Pose, Vec2};
-use crate::planners::hybrid_astar::{GoalSet, Leg};
+use crate::planners::hybrid_astar::{Entry, GoalSet, Leg};
 use crate::planners::{
     Budget, Guidance, HybridAStar, HybridAStarConfig, NoPath, PlanResult, Planner, Problem, Route,
 };
@@ -23,6 +22,9 @@ use super::{Features, PoseSelector};
 const CANDIDATES: usize = 8;
 /// How many abstractions `n3p` tries.
 const ABSTRACTIONS: usize = 3;
+/// Expansions that `n3p` spends on the way to the preparatory poses before it searches for
+/// the goal itself.
+const APPROACH_EXPANSIONS: usize = 5_000;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Strategy {
@@ -109,13 +111,27 @@ impl GuidedPlanner {
                 goal.add_preparatory(pose, rest, &problem.vehicle, &cost);
             }
         }
-        let before = *left;
-        let leg = self.hars.leg(problem, problem.start, &goal, left)?;
-        let route = if *left == before { Route::Direct } else { Route::Searched };
-        let entry = &goal.entries()[leg.entry];
-        let preparatory = entry.preparatory.then_some(entry.pose);
-        let guidance = Guidance { abstraction: found.first().copied(), preparatory, route };
-        Ok((leg.path, guidance))
+        let guidance = |entry: Option<&Entry>, route| Guidance {
+            abstraction: found.first().copied(),
+            preparatory: entry.filter(|e| e.preparatory).map(|e| e.pose),
+            route,
+        };
+        if let Some(leg) = self.hars.direct(problem, problem.start, &goal) {
+            return Ok((leg.path, guidance(goal.entries().get(leg.entry), Route::Direct)));
+        }
+        if let Some(preparatory) = goal.only_preparatory() {
+            let share = (*left).min(APPROACH_EXPANSIONS);
+            *left -= share;
+            let mut spend = share;
+            let leg = self.hars.search(problem, problem.start, &preparatory, &mut spend);
+            *left += spend;
+            if let Ok(leg) = leg {
+                let entry = preparatory.entries().get(leg.entry);
+                return Ok((leg.path, guidance(entry, Route::Searched)));
+            }
+        }
+        let leg = self.hars.search(problem, problem.start, &plain, left)?;
+        Ok((leg.path, guidance(None, Route::Fallback)))
     }
 
     /// `pose`, or one beside it, from which a curve leads to the goal, and that curve.
