@@ -1,0 +1,73 @@
+//! N3P with the models in the repository.
+
+use n3p::curves::Segment;
+use n3p::curves::reeds_shepp::{Word, words};
+use n3p::geometry::Pose;
+use n3p::planners::Problem;
+use n3p::selectors::Features;
+use n3p::selectors::artefact::Model;
+use n3p::vehicle::{Gear, Vehicle};
+use n3p::world::abstraction::abstractions;
+use n3p::world::cell::{Cell, Grid};
+use n3p::world::collision::CollisionWorld;
+use n3p::world::generate::{GeneratorConfig, generate};
+use n3p::world::{Level, ParkingType};
+use std::path::Path;
+
+/// Whether a Reeds-Shepp curve, with a straight into the spot, leads from `pose` to the
+/// goal of `cell` without contact: written here from the definition.
+fn has_free_connection(grid: &Grid, cell: &Cell, vehicle: &Vehicle, pose: Pose) -> bool {
+    let goal = grid.goal(cell.kind, vehicle);
+    let world = CollisionWorld::new(&grid.walls(cell), None, vehicle, 0.0);
+    if !world.pose_is_free(pose) {
+        return false;
+    }
+    let gears: &[Gear] = match cell.kind {
+        ParkingType::Forward => &[Gear::Forward],
+        ParkingType::Reverse => &[Gear::Backward],
+        ParkingType::Parallel => &[Gear::Forward, Gear::Backward],
+    };
+    let straights = gears.iter().flat_map(|g| (0..=100).map(|i| g.sign() * 0.05 * f64::from(i)));
+    let mut out: Vec<Word> = Vec::new();
+    straights.into_iter().any(|length| {
+        let entry = Segment::straight(length);
+        let from = entry.reversed().end(goal);
+        out.clear();
+        words(pose, from, vehicle.turning_radius(), &mut out);
+        let entry_free = world.segment_is_free(goal, entry.reversed());
+        entry_free && out.iter().any(|w| world.segments_are_free(pose, w.segments()))
+    })
+}
+
+#[test]
+fn every_pose_the_knn_selects_has_a_free_curve_in_the_scenes_own_cell() {
+    let model = Model::load(Path::new("models/knn.bin")).unwrap();
+    let vehicle = *model.vehicle();
+    let selector = model.into_selector();
+    let grid = *selector.grid();
+    let (mut asked, mut answered) = (0, 0);
+    let mut poses = Vec::new();
+    for kind in ParkingType::ALL {
+        for level in Level::ALL {
+            for i in 0..100 {
+                let scene = generate(&GeneratorConfig::default(), &vehicle, kind, level, 4242, i);
+                let problem = Problem::new(&scene).unwrap();
+                for found in abstractions(&problem.obstacles, kind, &grid) {
+                    asked += 1;
+                    let start = Pose { y: problem.start.y - found.shift, ..problem.start };
+                    poses.clear();
+                    selector.select(&Features::new(start, found.cell), 1, &mut poses);
+                    for &pose in &poses {
+                        answered += 1;
+                        assert!(
+                            has_free_connection(&grid, &found.cell, &vehicle, pose),
+                            "{} {pose:?} {found:?}",
+                            scene.name
+                        );
+                    }
+                }
+            }
+        }
+    }
+    assert!(answered > 900 && answered * 10 > asked * 9, "{answered} of {asked}");
+}
