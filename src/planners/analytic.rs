@@ -1,6 +1,17 @@
-//! Analytic expansion.
-use crate::curves::reeds_shepp::Word;
+//! Analytic expansion: Reeds-Shepp curves straight to the goal.
+//!
+//! As the paper says, a car aligned with a bay reaches any depth by driving straight, so
+//! the goal of a bay is a set: the parked pose shifted outward along its axis, joined by a
+//! straight that is checked itself. Curves to several of these *entries* are tried, the
+//! cheapest first.
+
+use crate::curves::reeds_shepp::{self, Word};
+use crate::curves::Segment;
 use crate::geometry::Pose;
+use crate::vehicle::Vehicle;
+
+use super::Problem;
+use super::cost::{CostModel, DriveState};
 
 /// The Reeds-Shepp curve (and entry straight) that reached the goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,4 +22,249 @@ pub struct AnalyticTail {
     pub word: Word,
     /// Signed length of the straight from the curve's end to the goal, metres.
     pub entry: f64,
+}
+
+impl AnalyticTail {
+    /// Curve and entry straight.
+    pub fn segments(&self) -> impl Iterator<Item = Segment> + '_ {
+        self.word.segments().iter().copied().chain([Segment::straight(self.entry)])
+    }
+}
+
+/// A goal pose, and the poses from which the rest of the way into it is known.
+#[derive(Clone, Debug)]
+pub(crate) struct GoalSet {
+    /// The goal itself.
+    pub pose: Pose,
+    entries: Vec<Entry>,
+}
+
+/// A pose to end a curve at, and the free motion from there to the goal.
+#[derive(Clone, Debug)]
+pub(crate) struct Entry {
+    /// The pose.
+    pub pose: Pose,
+    /// The motion from the pose to the goal; empty at the goal itself.
+    pub rest: Vec<Segment>,
+    /// Whether this is a preparatory pose (else a straight leads into the goal).
+    pub preparatory: bool,
+    /// Cost of `rest` when arriving in its gear with its steering.
+    cost: f64,
+    departure: DriveState,
+}
+
+impl Entry {
+    fn new(
+        pose: Pose,
+        rest: Vec<Segment>,
+        preparatory: bool,
+        vehicle: &Vehicle,
+        model: &CostModel,
+    ) -> Self {
+        let departure = rest.first().map_or(DriveState::PARKED, |s| DriveState {
+            gear: Some(s.gear()),
+            steer: vehicle.steer(s.curvature),
+        });
+        let mut state = departure;
+        let mut cost = 0.0;
+        for s in &rest {
+            let (c, next) = model.segment(state, s.length, vehicle.steer(s.curvature));
+            cost += c;
+            state = next;
+        }
+        Self { pose, rest, preparatory, cost, departure }
+    }
+
+    /// Cost of `rest` when arriving in its gear with its steering.
+    pub fn cost(&self) -> f64 {
+        self.cost
+    }
+
+    /// Gear and steering that `rest` begins with.
+    pub fn departure(&self) -> DriveState {
+        self.departure
+    }
+}
+
+impl GoalSet {
+    /// Only the pose itself.
+    pub fn single(pose: Pose) -> Self {
+        let (rest, departure) = (Vec::new(), DriveState::PARKED);
+        let goal = Entry { pose, rest, preparatory: false, cost: 0.0, departure };
+        Self { pose, entries: vec![goal] }
+    }
+
+    /// The poses to end a curve at; the goal itself comes first.
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    /// Adds every free entry straight into the goal of `problem`, `step` metres apart and
+    /// at most `longest` metres long.
+    pub fn add_straights(&mut self, problem: &Problem, model: &CostModel, step: f64, longest: f64) {
+        for gear in problem.entry_gears() {
+            for i in 1..=(longest / step + 1e-9) as usize {
+                let entry = Segment::straight(gear.sign() * i as f64 * step);
+                let outward = entry.reversed();
+                if !problem.collision.segment_is_free(self.pose, outward) {
+                    break;
+                }
+                let pose = outward.end(self.pose);
+                self.entries.push(Entry::new(pose, vec![entry], false, &problem.vehicle, model));
+            }
+        }
+    }
+
+    /// Adds a preparatory pose from which `rest` leads to the goal without contact.
+    pub fn add_preparatory(
+        &mut self,
+        pose: Pose,
+        rest: Vec<Segment>,
+        vehicle: &Vehicle,
+        model: &CostModel,
+    ) {
+        self.entries.push(Entry::new(pose, rest, true, vehicle, model));
+    }
+}
+
+/// Tries curves to a goal set; buffers are reused.
+#[derive(Debug, Default)]
+pub(super) struct AnalyticExpansion {
+    words: Vec<Word>,
+    candidates: Vec<Candidate>,
+}
+
+#[derive(Debug)]
+struct Candidate {
+    cost: f64,
+    word: Word,
+    target: usize,
+}
+
+/// A free way into a goal set: a curve, then the rest of an entry.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Connection<'a> {
+    /// Where the curve begins.
+    pub from: Pose,
+    /// The curve.
+    pub word: Word,
+    /// Where the curve ends and what follows.
+    pub entry: &'a Entry,
+    /// Its index in the goal set.
+    pub entry_index: usize,
+}
+
+impl Connection<'_> {
+    /// Curve and rest.
+    pub fn segments(&self) -> impl Iterator<Item = Segment> + '_ {
+        self.word.segments().iter().chain(&self.entry.rest).copied()
+    }
+
+    /// The curve as a tail; the entry must not be preparatory.
+    pub fn tail(&self) -> AnalyticTail {
+        let entry = self.entry.rest.first().map_or(0.0, |s| s.length);
+        AnalyticTail { from: self.from, word: self.word, entry }
+    }
+}
+
+impl AnalyticExpansion {
+    /// The cheapest free way from the free pose `from` into `goal`.
+    pub fn connect<'a>(
+        &mut self,
+        from: Pose,
+        goal: &'a GoalSet,
+        problem: &Problem,
+        model: &CostModel,
+    ) -> Option<Connection<'a>> {
+        self.candidates.clear();
+        for (i, entry) in goal.entries.iter().enumerate() {
+            self.add(from, entry.pose, entry.departure, entry.cost, i, &problem.vehicle, model);
+        }
+        let c = self.cheapest_free(from, problem)?;
+        let (entry, entry_index) = (&goal.entries[c.target], c.target);
+        Some(Connection { from, word: c.word, entry, entry_index })
+    }
+
+    /// The cheapest free curve from the free pose `from` to `to`, where the way goes on with
+    /// `departure`.
+    pub fn curve(
+        &mut self,
+        from: Pose,
+        to: Pose,
+        departure: DriveState,
+        problem: &Problem,
+        model: &CostModel,
+    ) -> Option<Word> {
+        self.candidates.clear();
+        self.add(from, to, departure, 0.0, 0, &problem.vehicle, model);
+        self.cheapest_free(from, problem).map(|c| c.word)
+    }
+
+    /// Adds all words to one target as candidates.
+    #[expect(clippy::too_many_arguments, reason = "private; one call per target")]
+    fn add(
+        &mut self,
+        from: Pose,
+        to: Pose,
+        departure: DriveState,
+        rest: f64,
+        target: usize,
+        vehicle: &Vehicle,
+        model: &CostModel,
+    ) {
+        self.words.clear();
+        reeds_shepp::words(from, to, vehicle.turning_radius(), &mut self.words);
+        for &word in &self.words {
+            let (cost, arrival) = curve_cost(&word, DriveState::PARKED, vehicle, model);
+            let cost = cost + model.change(arrival, departure) + rest;
+            self.candidates.push(Candidate { cost, word, target });
+        }
+    }
+
+    fn cheapest_free(&mut self, from: Pose, problem: &Problem) -> Option<&Candidate> {
+        self.candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let world = &problem.collision;
+        self.candidates.iter().find(|c| world.segments_are_free(from, c.word.segments()))
+    }
+}
+
+/// Cost of a word, and gear and steering at its end.
+fn curve_cost(
+    word: &Word,
+    mut state: DriveState,
+    vehicle: &Vehicle,
+    model: &CostModel,
+) -> (f64, DriveState) {
+    let mut total = 0.0;
+    for s in word.segments() {
+        let steer = vehicle.max_steer * sign_or_zero(s.curvature);
+        let (cost, next) = model.segment(state, s.length, steer);
+        total += cost;
+        state = next;
+    }
+    (total, state)
+}
+
+/// −1, 0 or 1.
+fn sign_or_zero(v: f64) -> f64 {
+    if v == 0.0 { 0.0 } else { v.signum() }
+}
+
+/// The least cost of any word from `from` to `to`, ignoring obstacles: the non-holonomic
+/// half of the heuristic.
+pub(super) fn least_curve_cost(
+    from: Pose,
+    to: Pose,
+    vehicle: &Vehicle,
+    model: &CostModel,
+    words: &mut Vec<Word>,
+) -> f64 {
+    words.clear();
+    reeds_shepp::words(from, to, vehicle.turning_radius(), words);
+    // Straightening the wheels at the start is not charged: a lower bound for any state.
+    let costs = words.iter().map(|w| {
+        let steer = w.segments().first().map_or(0.0, |s| vehicle.max_steer * sign_or_zero(s.curvature));
+        curve_cost(w, DriveState { gear: None, steer }, vehicle, model).0
+    });
+    costs.fold(f64::INFINITY, f64::min)
 }

@@ -69,15 +69,25 @@ impl CostModel {
         }
     }
 
+    /// Cost of changing gear and steering between two motions.
+    pub fn change(&self, before: DriveState, after: DriveState) -> f64 {
+        match (before.gear, after.gear) {
+            (Some(a), Some(b)) => {
+                let gear = if a == b { 0.0 } else { self.gear_change };
+                gear + self.steer_change * (after.steer - before.steer).abs()
+            }
+            // Standing before the first motion or after the last: wheels only.
+            (None, Some(_)) => self.steer_change * after.steer.abs(),
+            (_, None) => 0.0,
+        }
+    }
+
     /// Cost of one segment driven with steering angle `steer`, and the state after it.
     pub fn segment(&self, before: DriveState, length: f64, steer: f64) -> (f64, DriveState) {
         let gear = Gear::of(length);
-        let mut cost = length.abs() * (self.per_metre(gear) + self.steer * steer.abs());
-        if before.gear.is_some_and(|g| g != gear) {
-            cost += self.gear_change;
-        }
-        cost += self.steer_change * (steer - before.steer).abs();
-        (cost, DriveState { gear: Some(gear), steer })
+        let after = DriveState { gear: Some(gear), steer };
+        let driven = length.abs() * (self.per_metre(gear) + self.steer * steer.abs());
+        (driven + self.change(before, after), after)
     }
 
     /// Cost of driving `segments` from standstill.

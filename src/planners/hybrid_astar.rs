@@ -1,33 +1,271 @@
-//! Hybrid A*.
-use super::{Budget, PlanResult, Planner, Problem, cost::CostModel};
+//! Hybrid A* with Reeds-Shepp expansion (HARS), the method `ha-rs`.
+//!
+//! D. Dolgov, S. Thrun, M. Montemerlo, J. Diebel, "Practical Search Techniques in Path
+//! Planning for Autonomous Driving", 2008: a best-first search over a lattice whose cells
+//! keep continuous poses, guided by the larger of two cost-to-go heuristics, and ended by
+//! the first Reeds-Shepp curve that closes the way without contact.
+//!
+//! Ours runs from the goal to the start (see [`super::search`]): measured on the cells of
+//! tight bays this takes 10 to 100 times fewer expansions than the other way round. When
+//! the coarse lattice is exhausted, as in a parallel spot barely longer than the car, a
+//! fine one gets its turn.
+
 use serde::{Deserialize, Serialize};
 
+use crate::curves::Path;
+use crate::geometry::{Aabb, Pose};
+use crate::vehicle::Vehicle;
+
+use super::analytic::{AnalyticExpansion, AnalyticTail};
+pub(crate) use super::analytic::{Connection, GoalSet};
+use super::cost::CostModel;
+use super::search::{Search, Stop};
+use super::{Budget, NoPath, PlanResult, Planner, Problem};
+
 /// Settings of the search.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct HybridAStarConfig {
     /// The cost of driving.
     pub cost: CostModel,
+    /// The lattice tried first.
+    pub coarse: Resolution,
+    /// The lattice tried when the coarse one is exhausted.
+    pub fine: Resolution,
+    /// Side of a cell of the A* cost-to-go, metres.
+    pub cost_to_go_cell: f64,
+    /// The search stays within the box of start and goal grown by this, metres.
+    pub domain_margin: f64,
+    /// Whether a straight may lead into a bay (the goal set). `false` asks for curves that
+    /// end at the parked pose itself: an ablation.
+    pub entry_straight: bool,
+    /// Distance between entry poses, metres.
+    pub entry_step: f64,
+    /// Longest entry straight, metres.
+    pub entry_max: f64,
+    /// Weight of the heuristic; 1 is A*.
+    pub heuristic_weight: f64,
 }
+
+/// How finely a search looks.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Resolution {
+    /// Side of a lattice cell, metres.
+    pub cell: f64,
+    /// Heading bins of the lattice.
+    pub headings: usize,
+    /// Arc length of a motion primitive, metres.
+    pub step: f64,
+    /// Steering angles of the primitives, evenly spaced from full left to full right.
+    pub steers: usize,
+}
+
+impl Resolution {
+    fn validate(&self, name: &str) -> Result<(), String> {
+        let number = |field: &str, v: f64, low: f64, high: f64| {
+            if (low..=high).contains(&v) {
+                return Ok(());
+            }
+            Err(format!("planner.{name}.{field} is {v}; expected a number from {low} to {high}"))
+        };
+        number("cell", self.cell, 0.02, 5.0)?;
+        number("headings", self.headings as f64, 8.0, 1440.0)?;
+        number("step", self.step, 0.02, 10.0)?;
+        number("steers", self.steers as f64, 3.0, 63.0)?;
+        if self.steers.is_multiple_of(2) {
+            return Err(format!("planner.{name}.steers is {}; expected an odd number", self.steers));
+        }
+        Ok(())
+    }
+}
+
+impl Default for HybridAStarConfig {
+    fn default() -> Self {
+        Self {
+            cost: CostModel::default(),
+            coarse: Resolution { cell: 0.25, headings: 120, step: 0.4, steers: 5 },
+            fine: Resolution { cell: 0.05, headings: 360, step: 0.2, steers: 3 },
+            cost_to_go_cell: 0.5,
+            domain_margin: 12.0,
+            entry_straight: true,
+            entry_step: 1.0,
+            entry_max: 5.0,
+            heuristic_weight: 1.0,
+        }
+    }
+}
+
 impl HybridAStarConfig {
     /// Checks every field; the error says field, value and what would be right.
     pub fn validate(&self) -> Result<(), String> {
-        self.cost.validate()
+        self.cost.validate()?;
+        for (field, v, low, high) in [
+            ("cost_to_go_cell", self.cost_to_go_cell, 0.05, 5.0),
+            ("domain_margin", self.domain_margin, 1.0, 1000.0),
+            ("entry_step", self.entry_step, 0.05, 10.0),
+            ("entry_max", self.entry_max, 0.0, 50.0),
+            ("heuristic_weight", self.heuristic_weight, 0.0, 100.0),
+        ] {
+            if !(v.is_finite() && (low..=high).contains(&v)) {
+                return Err(format!("planner.{field} is {v}; expected a number from {low} to {high}"));
+            }
+        }
+        self.coarse.validate("coarse")?;
+        self.fine.validate("fine")
     }
 }
+
 /// Hybrid A* with Reeds-Shepp expansion: the method `ha-rs`.
-pub struct HybridAStar {}
+#[derive(Debug)]
+pub struct HybridAStar {
+    config: HybridAStarConfig,
+    search: Search,
+    analytic: AnalyticExpansion,
+}
+
+/// What one search found.
+#[derive(Clone, Debug)]
+pub(crate) struct Leg {
+    /// The path from the leg's start to its goal.
+    pub path: Path,
+    /// The goal-set entry it goes through.
+    pub entry: usize,
+}
+
 impl HybridAStar {
     /// A planner with `config`; buffers grow at first use.
-    pub fn new(_config: HybridAStarConfig) -> Self {
-        Self {}
+    pub fn new(config: HybridAStarConfig) -> Self {
+        Self { config, search: Search::default(), analytic: AnalyticExpansion::default() }
+    }
+
+    /// The settings.
+    pub fn config(&self) -> &HybridAStarConfig {
+        &self.config
+    }
+
+    /// The goal of `problem` with the entry straights that are free.
+    pub(crate) fn goal_set(&self, problem: &Problem) -> GoalSet {
+        let mut goal = GoalSet::single(problem.goal);
+        if self.config.entry_straight {
+            let c = &self.config;
+            goal.add_straights(problem, &c.cost, c.entry_step, c.entry_max);
+        }
+        goal
+    }
+
+    /// The cheapest free way from `from` into `goal`, without any search.
+    pub(crate) fn connect<'a>(
+        &mut self,
+        problem: &Problem,
+        from: Pose,
+        goal: &'a GoalSet,
+    ) -> Option<Connection<'a>> {
+        self.analytic.connect(from, goal, problem, &self.config.cost)
+    }
+
+    /// Searches from `start` to `goal` within `expansions`, which is reduced by what was
+    /// spent. The cost-to-go is computed only when the first curve fails.
+    pub(crate) fn leg(
+        &mut self,
+        problem: &Problem,
+        start: Pose,
+        goal: &GoalSet,
+        expansions: &mut usize,
+    ) -> Result<Leg, NoPath> {
+        if let Some(c) = self.connect(problem, start, goal) {
+            return Ok(Leg { path: Path::new(start, c.segments()), entry: c.entry_index });
+        }
+        // The fine lattice is left its share even when the coarse one goes on and on.
+        let reserve = *expansions / 2;
+        *expansions -= reserve;
+        let coarse = self.config.coarse;
+        let first = self.search_leg(&coarse, problem, start, goal, expansions);
+        *expansions += reserve;
+        match first {
+            Err(NoPath::Exhausted | NoPath::BudgetSpent) => {
+                let fine = self.config.fine;
+                self.search_leg(&fine, problem, start, goal, expansions)
+            }
+            result => result,
+        }
+    }
+
+    /// One search at one resolution.
+    fn search_leg(
+        &mut self,
+        resolution: &Resolution,
+        problem: &Problem,
+        start: Pose,
+        goal: &GoalSet,
+        expansions: &mut usize,
+    ) -> Result<Leg, NoPath> {
+        let domain = self.domain(problem, start, goal.pose);
+        self.search.begin(&self.config, resolution, problem, domain, start, goal);
+        while let Some(node) = self.search.pop() {
+            if *expansions == 0 {
+                return Err(NoPath::BudgetSpent);
+            }
+            *expansions -= 1;
+            if self.search.wants_curve(node) {
+                let departure = self.search.departure(node, goal);
+                let (to, model) = (self.search.pose(node), &self.config.cost);
+                if let Some(word) = self.analytic.curve(start, to, departure, problem, model) {
+                    let (way, entry) = self.search.way(node);
+                    let mut path = Path::new(start, word.segments().iter().copied());
+                    path.extend(way);
+                    path.extend(goal.entries()[entry].rest.iter().copied());
+                    return Ok(Leg { path, entry });
+                }
+            }
+            self.search.expand(node, goal, &self.config, problem);
+        }
+        Err(match self.search.stop() {
+            Stop::Enclosed => NoPath::Enclosed,
+            Stop::Exhausted => NoPath::Exhausted,
+        })
+    }
+
+    /// Where along `path` a curve to the goal begins: the first of its poses, half a metre
+    /// apart, from which a Reeds-Shepp curve (and an entry straight) reaches the goal
+    /// without contact. The paper's x_rs: reachable from the start, one curve from the goal.
+    pub fn first_tail(&mut self, problem: &Problem, path: &Path) -> Option<AnalyticTail> {
+        const SPACING: f64 = 0.5;
+        let goal = self.goal_set(problem);
+        let samples = path.sample(SPACING);
+        samples.iter().find_map(|s| Some(self.connect(problem, s.pose, &goal)?.tail()))
+    }
+
+    /// Where the search may go: around start and goal, within the bounds.
+    fn domain(&self, problem: &Problem, start: Pose, goal: Pose) -> Aabb {
+        let around = Aabb::around([start.position(), goal.position()]);
+        let mut domain = around.inflated(self.config.domain_margin);
+        if let Some(bounds) = problem.collision.bounds_aabb() {
+            domain.min = domain.min.sup(&bounds.min);
+            domain.max = domain.max.inf(&bounds.max);
+        }
+        domain
     }
 }
+
 impl Planner for HybridAStar {
     fn name(&self) -> &str {
         "ha-rs"
     }
-    fn plan(&mut self, _problem: &Problem, _budget: Budget) -> PlanResult {
-        unimplemented!()
+
+    fn plan(&mut self, problem: &Problem, budget: Budget) -> PlanResult {
+        let goal = self.goal_set(problem);
+        let mut left = budget.max_expansions;
+        let leg = self.leg(problem, problem.start, &goal, &mut left);
+        let expansions = budget.max_expansions - left;
+        match leg {
+            Ok(leg) => PlanResult::certified(problem, leg.path, expansions),
+            Err(reason) => PlanResult::none(reason, expansions),
+        }
     }
+}
+
+/// The largest disc around the rear axle inside every footprint, metres.
+pub(super) fn inscribed_radius(vehicle: &Vehicle) -> f64 {
+    (vehicle.width / 2.0).min(vehicle.rear_overhang).min(vehicle.front_extent())
 }

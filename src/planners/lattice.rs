@@ -1,1 +1,104 @@
-//! Dense visited set.
+//! Which lattice states a search has reached, and how cheaply.
+//!
+//! The lattice (x, y, heading) is stored in tiles allocated where the search goes, so that
+//! neither a large lot nor a reset costs more than the states really visited.
+
+use std::f64::consts::TAU;
+
+use crate::geometry::{Aabb, Pose};
+
+/// Cells per side of a tile.
+const TILE: usize = 8;
+
+/// No tile, or no cost yet.
+const NONE: u32 = u32::MAX;
+
+/// The cheapest cost-to-come found for every lattice state.
+#[derive(Debug, Default)]
+pub(super) struct Lattice {
+    origin: (f64, f64),
+    inverse_cell: f64,
+    headings: usize,
+    size: (usize, usize),
+    tiles_x: usize,
+    /// Tile index per tile position; `NONE` where the search has not been.
+    tile_of: Vec<u32>,
+    /// Costs of all tiles, `TILE × TILE × headings` each.
+    costs: Vec<f32>,
+}
+
+/// Index of a state in the lattice's storage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct StateIndex(usize);
+
+impl Lattice {
+    /// Forgets everything and covers `domain` with square cells of `cell` metres and
+    /// `headings` headings.
+    pub fn reset(&mut self, domain: &Aabb, cell: f64, headings: usize) {
+        let extent = domain.max - domain.min;
+        let count = |length: f64| (length / cell).ceil().max(1.0) as usize;
+        self.origin = (domain.min.x, domain.min.y);
+        self.inverse_cell = 1.0 / cell;
+        self.headings = headings;
+        self.size = (count(extent.x), count(extent.y));
+        self.tiles_x = self.size.0.div_ceil(TILE);
+        self.tile_of.clear();
+        self.tile_of.resize(self.tiles_x * self.size.1.div_ceil(TILE), NONE);
+        self.costs.clear();
+    }
+
+    /// The state of a pose; `None` outside the domain. Allocates its tile.
+    pub fn state(&mut self, pose: Pose) -> Option<StateIndex> {
+        let x = (pose.x - self.origin.0) * self.inverse_cell;
+        let y = (pose.y - self.origin.1) * self.inverse_cell;
+        if !(x >= 0.0 && y >= 0.0) {
+            return None;
+        }
+        let (x, y) = (x as usize, y as usize);
+        if x >= self.size.0 || y >= self.size.1 {
+            return None;
+        }
+        let turn = (pose.heading / TAU).rem_euclid(1.0);
+        let heading = (turn * self.headings as f64 + 0.5) as usize % self.headings;
+        let tile = &mut self.tile_of[y / TILE * self.tiles_x + x / TILE];
+        let states = TILE * TILE * self.headings;
+        if *tile == NONE {
+            *tile = (self.costs.len() / states) as u32;
+            self.costs.resize(self.costs.len() + states, f32::INFINITY);
+        }
+        let in_tile = (y % TILE * TILE + x % TILE) * self.headings + heading;
+        Some(StateIndex(*tile as usize * states + in_tile))
+    }
+
+    /// The cheapest cost recorded for a state; infinite when new.
+    pub fn cost(&self, state: StateIndex) -> f32 {
+        self.costs[state.0]
+    }
+
+    /// Records a cost.
+    pub fn set_cost(&mut self, state: StateIndex, cost: f32) {
+        self.costs[state.0] = cost;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn headings_wrap_and_states_differ() {
+        let mut l = Lattice::default();
+        l.reset(&Aabb::new(-10.0, -10.0, 10.0, 10.0), 0.5, 72);
+        let at = |l: &mut Lattice, x, y, h| l.state(Pose::new(x, y, h));
+        let a = at(&mut l, 0.1, 0.1, 0.0).unwrap();
+        assert_eq!(Some(a), at(&mut l, 0.2, 0.2, TAU - 0.01));
+        assert_ne!(Some(a), at(&mut l, 0.2, 0.2, 0.1));
+        assert_ne!(Some(a), at(&mut l, 0.6, 0.2, 0.0));
+        assert_eq!(None, at(&mut l, 10.1, 0.0, 0.0));
+        l.set_cost(a, 1.0);
+        assert_eq!(l.cost(a), 1.0);
+        l.reset(&Aabb::new(-10.0, -10.0, 10.0, 10.0), 0.5, 72);
+        let again = at(&mut l, 0.1, 0.1, 0.0).unwrap();
+        assert_eq!(l.cost(again), f32::INFINITY);
+    }
+}

@@ -9,14 +9,16 @@ pub mod cost;
 pub mod cost_to_go;
 pub mod hybrid_astar;
 mod lattice;
+mod nonholonomic;
 mod problem;
+mod search;
 
 pub use analytic::AnalyticTail;
-pub use hybrid_astar::{HybridAStar, HybridAStarConfig};
+pub use hybrid_astar::{HybridAStar, HybridAStarConfig, Resolution};
 pub use problem::{Problem, ProblemError};
 
 use crate::curves::Path;
-use crate::geometry::Pose;
+use crate::geometry::{Pose, signed_angle};
 use crate::world::abstraction::Abstraction;
 
 /// Anything that plans a path. Implementations keep buffers between calls; results
@@ -44,16 +46,30 @@ pub struct PlanResult {
     pub outcome: Result<Path, NoPath>,
     /// Node expansions spent.
     pub expansions: usize,
-    /// The Reeds-Shepp tail that reached the goal, when one did.
-    pub tail: Option<AnalyticTail>,
     /// What N3P took for the spot and did with it; `None` for plain planners.
     pub guidance: Option<Guidance>,
 }
 
 impl PlanResult {
+    /// A result with `path`, which must pass the exact check from the start to the goal:
+    /// the certificate every planner's path leaves with.
+    pub fn certified(problem: &Problem, path: Path, expansions: usize) -> Self {
+        /// End poses may differ from the goal by accumulated rounding only.
+        const END_TOLERANCE: f64 = 1e-6;
+        let end = path.end();
+        let arrives = end.distance(problem.goal) < END_TOLERANCE
+            && signed_angle(end.heading, problem.goal.heading).abs() < END_TOLERANCE
+            && path.start.distance(problem.start) < END_TOLERANCE;
+        if arrives && problem.collision.path_is_free(&path) {
+            Self { outcome: Ok(path), expansions, guidance: None }
+        } else {
+            Self::none(NoPath::Uncertified, expansions)
+        }
+    }
+
     /// A result without path.
     pub fn none(reason: NoPath, expansions: usize) -> Self {
-        Self { outcome: Err(reason), expansions, tail: None, guidance: None }
+        Self { outcome: Err(reason), expansions, guidance: None }
     }
 }
 

@@ -104,8 +104,7 @@ impl Problem {
         match self.kind {
             Some(ParkingType::Forward) => &[Gear::Forward],
             Some(ParkingType::Reverse) => &[Gear::Backward],
-            Some(ParkingType::Parallel) => &[],
-            None => &[Gear::Forward, Gear::Backward],
+            Some(ParkingType::Parallel) | None => &[Gear::Forward, Gear::Backward],
         }
     }
 }

@@ -1,1 +1,329 @@
-//! artefact
+//! Model files: finding, recognising, checking, writing.
+//!
+//! Two kinds exist, told apart by content: `knn.bin` (see [`super::knn_file`]) and one
+//! safetensors file per network (see [`super::mlp`]). Nothing is used before magic,
+//! version, checksum, shapes and vehicle are checked; every [`ArtefactError`] names the
+//! file, what is wrong with it and what would mend it. Files are written aside, synced
+//! and renamed, so that a reader never sees half a model.
+
+use std::fs::File;
+use std::io::{ErrorKind, Read, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use sha2::{Digest, Sha256};
+
+use super::PoseSelector;
+use super::knn::KnnSelector;
+use super::knn_file;
+use super::mlp::MlpSelector;
+use crate::vehicle::Vehicle;
+use crate::world::ParkingType;
+
+/// A model file that cannot be used, or not written.
+#[derive(Debug, thiserror::Error)]
+#[error("model {}: {fault}", .path.display())]
+pub struct ArtefactError {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong with it.
+    pub fault: Fault,
+}
+
+/// What is wrong with a model file.
+#[derive(Debug, thiserror::Error)]
+pub enum Fault {
+    /// There is no such file.
+    #[error("no such file; train one with n3p-train, or give the path of an existing one")]
+    Missing,
+    /// The operating system refused.
+    #[error("cannot be read: {0}")]
+    Unreadable(std::io::Error),
+    /// Zero bytes.
+    #[error("the file is empty; train it again with n3p-train, or copy it again")]
+    Empty,
+    /// Shorter or longer than its header says.
+    #[error("the file is cut off or padded: expected {expected} bytes, got {got}; copy it again")]
+    Length {
+        /// Bytes that the file's own header asks for.
+        expected: u64,
+        /// Bytes found.
+        got: u64,
+    },
+    /// Neither kind of model.
+    #[error("not a model: the content is neither a knn.bin nor a safetensors file of n3p-train")]
+    NotAModel,
+    /// Written by another version of this program.
+    #[error(
+        "format version {found}, but this program reads version {supported}; \
+         train it again with n3p-train"
+    )]
+    Version {
+        /// The file's version.
+        found: u32,
+        /// The version read by this program.
+        supported: u32,
+    },
+    /// The content is not what was written.
+    #[error("damaged: the checksum does not match the content; copy it again or train it again")]
+    Checksum,
+    /// The header contradicts itself or the content.
+    #[error("damaged header: {0}; copy it again or train it again")]
+    Header(String),
+    /// A tensor of the wrong shape.
+    #[error("tensor {tensor}: expected {expected}, got {got}; train it again with n3p-train")]
+    Shape {
+        /// Name of the tensor.
+        tensor: String,
+        /// Type and shape of the paper's network.
+        expected: String,
+        /// What the file holds.
+        got: String,
+    },
+    /// A weight that is no number.
+    #[error("tensor {tensor} holds {value}; train it again with n3p-train")]
+    NotFinite {
+        /// Name of the tensor.
+        tensor: String,
+        /// The value.
+        value: f32,
+    },
+    /// Trained for another car.
+    #[error(
+        "trained for another vehicle: its {field} is {model}, wanted {wanted}; \
+         collect and train for this vehicle: {command}"
+    )]
+    OtherVehicle {
+        /// Name of the vehicle's field.
+        field: &'static str,
+        /// Its value in the model.
+        model: f64,
+        /// Its value in the vehicle at hand.
+        wanted: f64,
+        /// Commands that train a model for the vehicle at hand.
+        command: String,
+    },
+    /// Networks that do not go together.
+    #[error("cannot be combined with the models before it: {0}")]
+    Mismatch(String),
+    /// The file cannot be written.
+    #[error("cannot write to the folder {}: {source}; choose another --out", .folder.display())]
+    Unwritable {
+        /// The folder.
+        folder: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+}
+
+impl Fault {
+    /// This fault of the file at `path`.
+    pub(crate) fn of(self, path: &Path) -> ArtefactError {
+        ArtefactError { path: path.to_owned(), fault: self }
+    }
+}
+
+/// A loaded and checked model.
+#[derive(Debug)]
+pub enum Model {
+    /// `knn.bin`.
+    Knn(KnnSelector),
+    /// A network of one parking type.
+    Mlp(MlpSelector),
+}
+
+impl Model {
+    /// Loads a model of either kind.
+    pub fn load(path: &Path) -> Result<Model, ArtefactError> {
+        let mut start = [0u8; 8];
+        let mut file = open(path)?;
+        let mut read = 0;
+        while read < start.len() {
+            match file.read(&mut start[read..]).map_err(|e| Fault::Unreadable(e).of(path))? {
+                0 if read == 0 => return Err(Fault::Empty.of(path)),
+                0 => return Err(Fault::NotAModel.of(path)),
+                n => read += n,
+            }
+        }
+        if start == knn_file::MAGIC {
+            return Ok(Model::Knn(KnnSelector::load(path)?));
+        }
+        // A safetensors file begins with the length of its header and a brace.
+        let mut brace = [0u8; 1];
+        match file.read_exact(&mut brace) {
+            Ok(()) if brace == *b"{" => Ok(Model::Mlp(MlpSelector::load(path)?)),
+            _ => Err(Fault::NotAModel.of(path)),
+        }
+    }
+
+    /// The vehicle the model was trained for.
+    pub fn vehicle(&self) -> &Vehicle {
+        match self {
+            Model::Knn(m) => m.vehicle(),
+            Model::Mlp(m) => m.vehicle(),
+        }
+    }
+
+    /// The file it was loaded from.
+    pub fn path(&self) -> &Path {
+        match self {
+            Model::Knn(m) => m.path(),
+            Model::Mlp(m) => m.path(),
+        }
+    }
+
+    /// The parking types it was trained for.
+    pub fn kinds(&self) -> Vec<ParkingType> {
+        match self {
+            Model::Knn(m) => m.kinds(),
+            Model::Mlp(m) => m.kinds(),
+        }
+    }
+
+    /// Refuses a model that was trained for another car; see [`check_vehicle`].
+    pub fn check_vehicle(&self, wanted: &Vehicle) -> Result<(), ArtefactError> {
+        let name = match self {
+            Model::Knn(_) => "knn",
+            Model::Mlp(_) => "mlp",
+        };
+        check_vehicle(self.path(), name, &self.kinds(), self.vehicle(), wanted)
+    }
+
+    /// The model as a selector that threads can share.
+    pub fn into_selector(self) -> Arc<dyn PoseSelector> {
+        match self {
+            Model::Knn(m) => Arc::new(m),
+            Model::Mlp(m) => Arc::new(m),
+        }
+    }
+}
+
+/// Compares what decides where a car can drive: dimensions and steering limit. Speeds
+/// only enter times, so a model serves every speed.
+pub fn check_vehicle(
+    path: &Path,
+    trainer: &str,
+    kinds: &[ParkingType],
+    model: &Vehicle,
+    wanted: &Vehicle,
+) -> Result<(), ArtefactError> {
+    /// Metres or radians: half a millimetre or 0.03°, far below what moves a preparatory
+    /// pose; vehicles given with few decimals stay usable.
+    const TOLERANCE: f64 = 5e-4;
+    let fields = [
+        ("length", model.length, wanted.length),
+        ("width", model.width, wanted.width),
+        ("wheelbase", model.wheelbase, wanted.wheelbase),
+        ("rear_overhang", model.rear_overhang, wanted.rear_overhang),
+        ("max_steer", model.max_steer, wanted.max_steer),
+    ];
+    for (field, model, wanted) in fields {
+        let same = (model - wanted).abs() <= TOLERANCE;
+        if !same {
+            let kind = match kinds {
+                [kind] => format!(" --type {kind}"),
+                _ => String::new(),
+            };
+            let command = format!(
+                "n3p-collect{kind} --config FILE --out datasets/NAME, with [vehicle] \
+                 {field} = {wanted} in FILE, then n3p-train {trainer}{kind} --data datasets/NAME"
+            );
+            return Err(Fault::OtherVehicle { field, model, wanted, command }.of(path));
+        }
+    }
+    Ok(())
+}
+
+/// Where the model called `name` lies: a path is taken as it is; a bare name is looked
+/// for in the working folder, then in `models/`.
+pub fn find_model(name: impl AsRef<Path>) -> PathBuf {
+    let name = name.as_ref();
+    let in_models = Path::new("models").join(name);
+    let bare = name.components().count() == 1;
+    if bare && !name.exists() && in_models.exists() { in_models } else { name.to_owned() }
+}
+
+/// Checks that a file could be written at `path`, creating its folder.
+pub fn check_writable(path: &Path) -> Result<(), ArtefactError> {
+    let folder = folder_of(path);
+    let refuse = |source| Fault::Unwritable { folder: folder.to_owned(), source }.of(path);
+    std::fs::create_dir_all(folder).map_err(refuse)?;
+    if path.is_dir() {
+        return Err(refuse(std::io::Error::new(ErrorKind::IsADirectory, "the path is a folder")));
+    }
+    tempfile::NamedTempFile::new_in(folder).map(drop).map_err(refuse)
+}
+
+/// Writes a file aside, syncs it and renames it into place.
+pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), ArtefactError> {
+    let folder = folder_of(path);
+    let refuse = |source| Fault::Unwritable { folder: folder.to_owned(), source }.of(path);
+    std::fs::create_dir_all(folder).map_err(refuse)?;
+    let mut builder = tempfile::Builder::new();
+    // Temporary files are private by default; a model is as readable as any other file.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));
+    let mut file = builder.tempfile_in(folder).map_err(refuse)?;
+    file.write_all(bytes).map_err(refuse)?;
+    file.as_file().sync_all().map_err(refuse)?;
+    file.persist(path).map_err(|e| refuse(e.error))?;
+    Ok(())
+}
+
+/// Opens a model file, refusing missing ones.
+pub(crate) fn open(path: &Path) -> Result<File, ArtefactError> {
+    File::open(path).map_err(|e| match e.kind() {
+        ErrorKind::NotFound => Fault::Missing.of(path),
+        _ => Fault::Unreadable(e).of(path),
+    })
+}
+
+/// SHA-256 over the concatenation of `parts`.
+pub(crate) fn sha256(parts: &[&[u8]]) -> [u8; 32] {
+    let mut hasher = Sha256::new();
+    for part in parts {
+        hasher.update(part);
+    }
+    hasher.finalize().into()
+}
+
+/// Lower-case hexadecimal digits.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_vehicle_names_field_values_and_command() {
+        let model = Vehicle::default();
+        let wanted = Vehicle { wheelbase: 2.7, ..model };
+        let kinds = [ParkingType::Parallel];
+        let error = check_vehicle(Path::new("m"), "mlp", &kinds, &model, &wanted).unwrap_err();
+        let text = error.to_string();
+        for part in ["wheelbase is 2.83", "wanted 2.7", "n3p-train mlp --type parallel"] {
+            assert!(text.contains(part), "{text}");
+        }
+        let faster = Vehicle { forward_speed: 3.0, ..model };
+        assert!(check_vehicle(Path::new("m"), "mlp", &kinds, &model, &faster).is_ok());
+    }
+
+    #[test]
+    fn writes_into_new_folders_and_refuses_files_as_folders() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a/b.bin");
+        write_atomic(&path, b"x").unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"x");
+        let error = check_writable(&path.join("c.bin")).unwrap_err().to_string();
+        assert!(error.contains("cannot write to the folder") && error.contains("b.bin"), "{error}");
+    }
+}

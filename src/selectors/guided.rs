@@ -1,26 +1,185 @@
-//! N3P: guided planning.
+//! N3P: planning guided by a preparatory pose.
+//!
+//! [`GuidedPlanner::paper`] is the paper's Algorithm 1: abstraction → cell → one pose →
+//! HARS to the pose → HARS from the pose to the goal. [`GuidedPlanner::ranked`] is ours:
+//! several ranked poses whose curve to the goal is free join the goal set of one search,
+//! so that usually two Reeds-Shepp curves are the whole plan, without any search and
+//! without its heuristic; and where they are not, the search has every chance plain HARS
+//! has. Either way the path leaves certified by the exact swept check.
+
 use std::sync::Arc;
 
-use super::PoseSelector;
-use crate::planners::{Budget, HybridAStarConfig, PlanResult, Planner, Problem};
+use crate::curves::{Path, Segment};
+use crate::geometry::{Pose, Vec2};
+use crate::planners::hybrid_astar::{GoalSet, Leg};
+use crate::planners::{
+    Budget, Guidance, HybridAStar, HybridAStarConfig, NoPath, PlanResult, Planner, Problem, Route,
+};
+use crate::world::abstraction::{Abstraction, abstractions};
+
+use super::{Features, PoseSelector};
+
+/// How many ranked poses `n3p` asks for in each abstraction.
+const CANDIDATES: usize = 8;
+/// How many abstractions `n3p` tries.
+const ABSTRACTIONS: usize = 3;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Strategy {
+    Paper,
+    Ranked,
+}
 
 /// N3P over a selector.
-pub struct GuidedPlanner {}
+pub struct GuidedPlanner {
+    name: String,
+    strategy: Strategy,
+    selector: Arc<dyn PoseSelector>,
+    hars: HybridAStar,
+    poses: Vec<Pose>,
+}
+
 impl GuidedPlanner {
     /// The paper's Algorithm 1 (`knn-n3p`, `mlp-n3p`): one preparatory pose, two searches.
-    pub fn paper(_name: &str, _s: Arc<dyn PoseSelector>, _config: HybridAStarConfig) -> Self {
-        Self {}
+    pub fn paper(name: &str, selector: Arc<dyn PoseSelector>, config: HybridAStarConfig) -> Self {
+        Self::new(name, Strategy::Paper, selector, config)
     }
+
     /// Ours (`n3p`): ranked candidates, double Reeds-Shepp test before any search.
-    pub fn ranked(_name: &str, _s: Arc<dyn PoseSelector>, _config: HybridAStarConfig) -> Self {
-        Self {}
+    pub fn ranked(name: &str, selector: Arc<dyn PoseSelector>, config: HybridAStarConfig) -> Self {
+        Self::new(name, Strategy::Ranked, selector, config)
+    }
+
+    fn new(
+        name: &str,
+        strategy: Strategy,
+        selector: Arc<dyn PoseSelector>,
+        config: HybridAStarConfig,
+    ) -> Self {
+        let hars = HybridAStar::new(config);
+        Self { name: name.to_owned(), strategy, selector, hars, poses: Vec::new() }
+    }
+
+    /// Up to `k` preparatory poses for an abstraction of `problem`, planning frame.
+    fn select(&mut self, problem: &Problem, found: &Abstraction, k: usize) {
+        // The cell's frame lies `shift` further out than the problem's.
+        let start = Pose { y: problem.start.y - found.shift, ..problem.start };
+        self.poses.clear();
+        self.selector.select(&Features::new(start, found.cell), k, &mut self.poses);
+        self.poses.iter_mut().for_each(|p| p.y += found.shift);
+    }
+
+    fn plan_paper(&mut self, problem: &Problem, found: &[Abstraction], left: &mut usize) -> Attempt {
+        let found = *found.first()?;
+        self.select(problem, &found, 1);
+        let pose = *self.poses.first()?;
+        if !problem.collision.pose_is_free(pose) {
+            return None;
+        }
+        let before = *left;
+        let Leg { mut path, .. } =
+            self.hars.leg(problem, problem.start, &GoalSet::single(pose), left).ok()?;
+        let goal = self.hars.goal_set(problem);
+        let second = self.hars.leg(problem, pose, &goal, left).ok()?;
+        path.extend(second.path.segments);
+        let route = if *left == before { Route::Direct } else { Route::Searched };
+        Some((path, Guidance { abstraction: Some(found), preparatory: Some(pose), route }))
+    }
+
+    fn plan_ranked(
+        &mut self,
+        problem: &Problem,
+        found: &[Abstraction],
+        left: &mut usize,
+    ) -> Result<(Path, Guidance), NoPath> {
+        let plain = self.hars.goal_set(problem);
+        let mut goal = plain.clone();
+        for found in found.iter().take(ABSTRACTIONS) {
+            self.select(problem, found, CANDIDATES);
+            for i in 0..self.poses.len() {
+                let Some((pose, rest)) = self.feasible(problem, self.poses[i], &plain) else {
+                    continue;
+                };
+                let cost = self.hars.config().cost;
+                goal.add_preparatory(pose, rest, &problem.vehicle, &cost);
+            }
+        }
+        let before = *left;
+        let leg = self.hars.leg(problem, problem.start, &goal, left)?;
+        let route = if *left == before { Route::Direct } else { Route::Searched };
+        let entry = &goal.entries()[leg.entry];
+        let preparatory = entry.preparatory.then_some(entry.pose);
+        let guidance = Guidance { abstraction: found.first().copied(), preparatory, route };
+        Ok((leg.path, guidance))
+    }
+
+    /// `pose`, or one beside it, from which a curve leads to the goal, and that curve.
+    ///
+    /// A pose of the KNN has one unless the scene is tighter than its cell; a pose of the
+    /// MLP may miss the feasible set by a little, so it is nudged along and across.
+    fn feasible(
+        &mut self,
+        problem: &Problem,
+        pose: Pose,
+        goal: &GoalSet,
+    ) -> Option<(Pose, Vec<Segment>)> {
+        const NUDGES: [(f64, f64, f64); 9] = [
+            (0.0, 0.0, 0.0),
+            (0.15, 0.0, 0.0),
+            (-0.15, 0.0, 0.0),
+            (0.0, 0.15, 0.0),
+            (0.0, -0.15, 0.0),
+            (0.0, 0.0, 0.05),
+            (0.0, 0.0, -0.05),
+            (0.4, 0.0, 0.0),
+            (-0.4, 0.0, 0.0),
+        ];
+        NUDGES.iter().find_map(|&(along, across, turn)| {
+            let p = pose.point_to_parent(Vec2::new(along, across));
+            let nudged = Pose::new(p.x, p.y, pose.heading + turn);
+            if !problem.collision.pose_is_free(nudged) {
+                return None;
+            }
+            let connection = self.hars.connect(problem, nudged, goal)?;
+            Some((nudged, connection.segments().collect()))
+        })
+    }
+
+    fn fall_back(&mut self, problem: &Problem, left: &mut usize) -> Result<(Path, Guidance), NoPath> {
+        let goal = self.hars.goal_set(problem);
+        let leg = self.hars.leg(problem, problem.start, &goal, left)?;
+        let guidance = Guidance { abstraction: None, preparatory: None, route: Route::Fallback };
+        Ok((leg.path, guidance))
     }
 }
+
+/// A path and how it came about, or none.
+type Attempt = Option<(Path, Guidance)>;
+
 impl Planner for GuidedPlanner {
     fn name(&self) -> &str {
-        unimplemented!()
+        &self.name
     }
-    fn plan(&mut self, _problem: &Problem, _budget: Budget) -> PlanResult {
-        unimplemented!()
+
+    fn plan(&mut self, problem: &Problem, budget: Budget) -> PlanResult {
+        let found = problem.kind.map_or_else(Vec::new, |kind| {
+            abstractions(&problem.obstacles, kind, self.selector.grid())
+        });
+        let mut left = budget.max_expansions;
+        let planned = match self.strategy {
+            Strategy::Paper => match self.plan_paper(problem, &found, &mut left) {
+                Some(planned) => Ok(planned),
+                None => self.fall_back(problem, &mut left),
+            },
+            Strategy::Ranked => self.plan_ranked(problem, &found, &mut left),
+        };
+        let expansions = budget.max_expansions - left;
+        match planned {
+            Ok((path, guidance)) => {
+                let result = PlanResult::certified(problem, path, expansions);
+                PlanResult { guidance: Some(guidance), ..result }
+            }
+            Err(reason) => PlanResult::none(reason, expansions),
+        }
     }
 }

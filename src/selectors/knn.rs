@@ -1,1 +1,233 @@
-//! knn
+//! Preparatory poses of the nearest stored samples.
+//!
+//! Only samples of the query's own grid cell are neighbours, or, where that cell has none,
+//! those of the nearest smaller cell. The neighbour's cell is thus never larger than the
+//! query's, and its Reeds-Shepp connection to the goal is free by construction.
+//!
+//! Starts are compared as points `(x, y, r·cos θ, r·sin θ)`, metres: turning by Δθ counts
+//! like moving `r·Δθ`. `r` is half the turning radius ρ by default, since a car turns by Δθ
+//! on an arc of length ρ·Δθ, half of it forward and half backward when it must not move on.
+//!
+//! Sources: paper, section IV (KNN-N3P). Read next: [`super::knn_file`].
+
+use std::num::NonZero;
+use std::path::Path;
+use std::sync::OnceLock;
+
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+
+use super::artefact::ArtefactError;
+use super::knn_file::KnnFile;
+use super::{Features, PoseSelector};
+use crate::geometry::{Pose, signed_angle};
+use crate::vehicle::Vehicle;
+use crate::world::ParkingType;
+use crate::world::cell::Grid;
+
+/// The KNN selector. A cell's search tree is built when the cell is first asked for (some
+/// ten microseconds), so that loading costs little more than the checksum.
+#[derive(Debug)]
+pub struct KnnSelector {
+    file: KnnFile,
+    /// `[kind][cell]`, as in the file.
+    cells: Vec<Vec<OnceLock<CellPoints>>>,
+}
+
+/// The metric's points of one cell, in sample order, and their tree.
+struct CellPoints {
+    points: Vec<[f32; 4]>,
+    tree: ImmutableKdTree<f32, 4>,
+}
+
+impl std::fmt::Debug for CellPoints {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "CellPoints({})", self.points.len())
+    }
+}
+
+/// A stored sample near a query.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Neighbour {
+    /// Squared distance in the metric, m².
+    pub distance_sq: f64,
+    /// Index of the cell it was stored for: the query's, or a smaller one.
+    pub cell: usize,
+    /// Its position among all samples of its parking type.
+    pub sample: usize,
+}
+
+impl KnnSelector {
+    /// Two preparatory poses this close count as one, metres.
+    pub const SAME_POSITION: f64 = 0.05;
+    /// Two preparatory poses this close count as one, radians (2°).
+    pub const SAME_HEADING: f64 = 2.0 * std::f64::consts::PI / 180.0;
+    /// When several poses are wanted, this many neighbours per pose are looked at, since
+    /// neighbours often agree.
+    pub const NEIGHBOURS_PER_POSE: usize = 4;
+
+    /// Maps and checks a `knn.bin`.
+    pub fn load(path: &Path) -> Result<Self, ArtefactError> {
+        let file = KnnFile::open(path)?;
+        let kinds = &file.header().kinds;
+        let cells = kinds.iter().map(|k| (0..k.cells).map(|_| OnceLock::new()).collect()).collect();
+        Ok(Self { file, cells })
+    }
+
+    /// The vehicle the samples were driven with.
+    pub fn vehicle(&self) -> &Vehicle {
+        &self.file.header().vehicle
+    }
+
+    /// The file it was loaded from.
+    pub fn path(&self) -> &Path {
+        self.file.path()
+    }
+
+    /// The mapped file: header and stored samples.
+    pub fn file(&self) -> &KnnFile {
+        &self.file
+    }
+
+    /// The point of a pose in the metric, metres. `radius`: metres per radian.
+    pub fn point(pose: Pose, radius: f64) -> [f32; 4] {
+        let (sin, cos) = pose.sin_cos();
+        [pose.x, pose.y, radius * cos, radius * sin].map(|v| v as f32)
+    }
+
+    /// Squared distance of two points of the metric, m², summed in double precision.
+    pub fn distance_sq(a: &[f32; 4], b: &[f32; 4]) -> f64 {
+        let squares = std::array::from_fn::<f64, 4, _>(|i| {
+            let d = f64::from(a[i]) - f64::from(b[i]);
+            d * d
+        });
+        squares.iter().sum()
+    }
+
+    /// The cell whose samples answer for `cell`: itself, or where it has none the nearest
+    /// smaller one, by grid steps in all three parameters together; of equally near ones
+    /// the one with the widest lane, then the widest spot.
+    pub fn source_cell(&self, kind: usize, cell: usize) -> Option<usize> {
+        if !self.file.samples(kind, cell).is_empty() {
+            return Some(cell);
+        }
+        let header = self.file.header();
+        let n_dead = header.grid.dead_end.len();
+        let n_spot = header.grid.spot_width(header.kinds[kind].kind).len();
+        let (lane, spot, dead) = (cell / (n_dead * n_spot), cell / n_dead % n_spot, cell % n_dead);
+        let mut best: Option<(usize, usize)> = None;
+        for l in (0..=lane).rev() {
+            for s in (0..=spot).rev() {
+                for d in (0..=dead).rev() {
+                    let steps = (lane - l) + (spot - s) + (dead - d);
+                    if best.is_some_and(|(least, _)| steps >= least) {
+                        break;
+                    }
+                    let candidate = (l * n_spot + s) * n_dead + d;
+                    if !self.file.samples(kind, candidate).is_empty() {
+                        best = Some((steps, candidate));
+                    }
+                }
+            }
+        }
+        best.map(|(_, candidate)| candidate)
+    }
+
+    /// The `n` nearest samples, nearest first; equally near ones in sample order. Empty for
+    /// a parking type, or below a cell, without samples.
+    pub fn nearest(&self, features: &Features, n: usize) -> Vec<Neighbour> {
+        let header = self.file.header();
+        let source = || {
+            let kind = header.kinds.iter().position(|k| k.kind == features.cell.kind)?;
+            Some((kind, self.source_cell(kind, header.grid.floor(&features.cell)?)?))
+        };
+        let (Some((kind, cell)), Some(n)) = (source(), NonZero::new(n)) else {
+            return Vec::new();
+        };
+        if !features.start.is_finite() {
+            return Vec::new();
+        }
+        let first = self.file.samples(kind, cell).start;
+        let query = Self::point(features.start, header.heading_radius);
+        let mut hits = self.points(kind, cell).nearest(&query, n);
+        hits.truncate(n.get());
+        hits.into_iter()
+            .map(|(distance_sq, i)| Neighbour { distance_sq, cell, sample: first + i })
+            .collect()
+    }
+
+    fn points(&self, kind: usize, cell: usize) -> &CellPoints {
+        self.cells[kind][cell].get_or_init(|| {
+            let radius = self.file.header().heading_radius;
+            let starts = self.file.samples(kind, cell).map(|i| self.file.start(kind, i));
+            let points: Vec<_> = starts.map(|s| Self::point(s, radius)).collect();
+            let tree = ImmutableKdTree::new_from_slice(&points)
+                .expect("a cell's points are finite and not empty");
+            CellPoints { points, tree }
+        })
+    }
+}
+
+impl CellPoints {
+    /// At least the `n` nearest `(distance_sq, position)`, sorted by both.
+    ///
+    /// The tree computes in single precision and breaks ties as it likes, so it is asked
+    /// for one more. Where that one is clearly farther the others are the nearest; where it
+    /// is not, a scan decides.
+    fn nearest(&self, query: &[f32; 4], n: NonZero<usize>) -> Vec<(f64, usize)> {
+        /// Far above the rounding of a sum of four squares in single precision (2e-7).
+        const ROUNDING: f64 = 1e-5;
+        let exact = |i: usize| (KnnSelector::distance_sq(&self.points[i], query), i);
+        let by_distance =
+            |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1));
+        if n.get() < self.points.len() {
+            let found = self
+                .tree
+                .query(query)
+                .nearest_n::<SquaredEuclidean<f32>>(n.saturating_add(1))
+                .execute();
+            let mut hits: Vec<_> = found.iter().map(|hit| exact(hit.item as usize)).collect();
+            hits.sort_unstable_by(by_distance);
+            if let [.., last_wanted, beyond] = hits[..]
+                && hits.len() > n.get()
+                && beyond.0 > last_wanted.0 * (1.0 + ROUNDING) + f64::MIN_POSITIVE
+            {
+                return hits;
+            }
+        }
+        let mut all: Vec<_> = (0..self.points.len()).map(exact).collect();
+        all.sort_unstable_by(by_distance);
+        all
+    }
+}
+
+impl PoseSelector for KnnSelector {
+    fn select(&self, features: &Features, k: usize, out: &mut Vec<Pose>) {
+        let header = self.file.header();
+        let Some(kind) = header.kinds.iter().position(|h| h.kind == features.cell.kind) else {
+            return;
+        };
+        let first = out.len();
+        let looked_at = if k > 1 { k.saturating_mul(Self::NEIGHBOURS_PER_POSE) } else { k };
+        for neighbour in self.nearest(features, looked_at) {
+            let pose = self.file.preparatory(kind, neighbour.sample);
+            let known = out[first..].iter().any(|other| {
+                other.distance(pose) <= Self::SAME_POSITION
+                    && signed_angle(other.heading, pose.heading).abs() <= Self::SAME_HEADING
+            });
+            if !known {
+                out.push(pose);
+            }
+            if out.len() - first == k {
+                return;
+            }
+        }
+    }
+
+    fn grid(&self) -> &Grid {
+        &self.file.header().grid
+    }
+
+    fn kinds(&self) -> Vec<ParkingType> {
+        self.file.header().kinds.iter().map(|k| k.kind).collect()
+    }
+}

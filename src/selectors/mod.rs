@@ -2,15 +2,20 @@
 //!
 //! A [`PoseSelector`] ranks preparatory poses for [`Features`]; [`knn`] and [`mlp`] are
 //! the two of the paper, [`artefact`] reads and checks their files, and [`guided`] is
-//! N3P: a planner that uses a selector.
+//! N3P: a planner that uses a selector. Read next: [`knn_file`] and [`network`] for what
+//! the files hold.
 
 pub mod artefact;
 mod features;
 pub mod guided;
 pub mod knn;
+pub mod knn_file;
 pub mod mlp;
+pub mod network;
+mod normaliser;
 
 pub use features::Features;
+pub use normaliser::Normaliser;
 
 use crate::geometry::Pose;
 use crate::world::ParkingType;

@@ -1,1 +1,99 @@
-//! training
+//! Rows of a data set → model files.
+//!
+//! [`knn`] stores samples; [`mlp`] trains a network, with [`optimiser`] and [`curve`] as its
+//! helpers. Both take samples and metadata of one data set and write an artefact that
+//! [`crate::selectors`] loads.
+
+pub mod curve;
+pub mod knn;
+pub mod mlp;
+mod mlp_config;
+pub mod optimiser;
+
+pub use mlp_config::{Loss, MlpConfig, Schedule};
+
+use crate::dataset::{Sample, Status};
+use crate::selectors::artefact::ArtefactError;
+use crate::world::ParkingType;
+
+/// A training that cannot start or go on.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainingError {
+    /// Nothing to learn from.
+    #[error("the data set has no solved sample of type {0}; collect some: n3p-collect --type {0}")]
+    NoSamples(ParkingType),
+    /// Too few to train and validate.
+    #[error("the data set has {samples} solved samples of type {kind}; at least {needed} needed")]
+    TooFew {
+        /// The parking type.
+        kind: ParkingType,
+        /// Solved samples found.
+        samples: usize,
+        /// The least number.
+        needed: usize,
+    },
+    /// A sample that cannot be.
+    #[error("sample {sample} of {kind} cell {cell}: {problem}; the data set is damaged")]
+    BadSample {
+        /// The parking type.
+        kind: ParkingType,
+        /// Index of the cell.
+        cell: u32,
+        /// Index of the sample in its cell.
+        sample: u32,
+        /// What is wrong.
+        problem: &'static str,
+    },
+    /// A setting outside its range.
+    #[error("{field} is {value}; expected {expected}")]
+    Config {
+        /// Name of the setting.
+        field: &'static str,
+        /// Its value.
+        value: String,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// The loss left the numbers.
+    #[error("the training loss became {loss} in epoch {epoch}; try a smaller learning_rate")]
+    Diverged {
+        /// The epoch, from 1.
+        epoch: usize,
+        /// The loss.
+        loss: f32,
+    },
+    /// The model file.
+    #[error(transparent)]
+    Artefact(#[from] ArtefactError),
+    /// The tensor library.
+    #[error("tensor computation failed: {0}")]
+    Candle(#[from] candle_core::Error),
+    /// The picture of the loss.
+    #[error("cannot draw the loss curve: {0}")]
+    Curve(String),
+}
+
+/// The solved samples of a type, by cell and then by index, whatever the order of `samples`.
+fn solved(
+    samples: &[Sample],
+    kind: ParkingType,
+    cells: usize,
+) -> Result<Vec<&Sample>, TrainingError> {
+    let wanted = |s: &&Sample| s.cell.kind == kind && s.status == Status::Solved;
+    let mut solved: Vec<&Sample> = samples.iter().filter(wanted).collect();
+    solved.sort_by_key(|s| (s.cell_index, s.sample_index));
+    for s in &solved {
+        let problem = if !s.start.is_finite() {
+            "its start is not finite"
+        } else if !s.rs_start.is_finite() {
+            "it is solved, but its rs_start is not finite"
+        } else if s.cell_index as usize >= cells {
+            "its cell is not in the grid"
+        } else {
+            continue;
+        };
+        let (cell, sample) = (s.cell_index, s.sample_index);
+        return Err(TrainingError::BadSample { kind, cell, sample, problem });
+    }
+    Ok(solved)
+}

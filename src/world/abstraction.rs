@@ -1,6 +1,15 @@
 //! Scene → cell: an inner approximation of the free space around the spot.
+//!
+//! The paper's abstraction (section IV): the largest obstacle-free rectangle of lane next
+//! to the spot, and the spot. No obstacle ever reaches into the region found, so a path
+//! that is valid in a stored cell ≤ the one found is valid in the scene.
+//!
+//! Everything is read off the obstacle edges in the spot frame. The region is connected
+//! and contains the parked car, so if no edge enters it, no obstacle's inside does.
 
-use super::cell::Cell;
+use super::cell::{Cell, Grid};
+use super::{Obstacles, ParkingType};
+use crate::geometry::{Aabb, Vec2};
 
 /// What the abstraction found in a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,7 +20,171 @@ pub struct Abstraction {
     pub cell: Cell,
     /// Its index in the grid.
     pub index: usize,
-    /// How far the spot frame was shifted along +y before measuring, metres: bays whose
+    /// How far the cell's frame lies along +y of the spot frame, metres: bays whose
     /// neighbours protrude into the lane begin their lane further out.
     pub shift: f64,
+}
+
+impl Abstraction {
+    /// The free lane and spot rectangles of the cell used, in the spot frame.
+    pub fn regions(&self, grid: &Grid) -> [Aabb; 2] {
+        grid.regions(&self.cell).map(|r| {
+            let up = Vec2::new(0.0, self.shift);
+            Aabb { min: r.min + up, max: r.max + up }
+        })
+    }
+}
+
+/// Obstacles that only touch a region's border do not enter it.
+const TOUCH: f64 = 1e-6;
+
+/// The farthest a bay's lane may begin beyond its usual boundary, metres.
+const MAX_SHIFT: f64 = 1.0;
+
+/// The cells found around the spot, largest lane first; none where the scene has no such
+/// structure or lies below the grid.
+///
+/// `obstacles` in the spot frame. Several cells are maximal when an obstacle can either
+/// shorten the lane or narrow it; none of those returned contains another.
+pub fn abstractions(obstacles: &Obstacles, kind: ParkingType, grid: &Grid) -> Vec<Abstraction> {
+    let edges: Vec<(Vec2, Vec2)> = obstacles.edges().collect();
+    let mut found = Vec::new();
+    let low = bottom_shift(&edges, kind, grid);
+    for shift in [low, protrusion(obstacles, kind, grid).max(low)] {
+        if shift > MAX_SHIFT || (shift > 0.0 && !kind.is_bay()) {
+            continue;
+        }
+        found = at_shift(&edges, kind, grid, shift);
+        if !found.is_empty() {
+            break;
+        }
+    }
+    found
+}
+
+/// The maximal cells whose frame lies `shift` metres along +y.
+fn at_shift(edges: &[(Vec2, Vec2)], kind: ParkingType, grid: &Grid, shift: f64) -> Vec<Abstraction> {
+    let boundary = grid.lane_boundary(kind) + shift;
+    let floor = shift - grid.lane_boundary(kind);
+    let Some(spot_width) = spot_width(edges, floor, boundary) else { return Vec::new() };
+    let axis = &grid.dead_end;
+    // The lane's width for every dead end of the grid: nothing enters [−back, D].
+    let mut widths = vec![f64::INFINITY; axis.len()];
+    for &(a, b) in edges {
+        let Some((a, b)) = clip(a, b, 1, boundary + TOUCH, f64::INFINITY) else { continue };
+        let (x_min, x_max) = (a.x.min(b.x), a.x.max(b.x));
+        if x_max <= -grid.back + TOUCH {
+            continue;
+        }
+        for (i, width) in widths.iter_mut().enumerate() {
+            let dead_end = axis.value(i);
+            if x_min >= dead_end - TOUCH {
+                continue;
+            }
+            if let Some((a, b)) = clip(a, b, 0, -grid.back + TOUCH, dead_end - TOUCH) {
+                *width = width.min(a.y.min(b.y) - boundary);
+            }
+        }
+    }
+    let mut found: Vec<Abstraction> = Vec::new();
+    for (i, &width) in widths.iter().enumerate().rev() {
+        let lane_width = width.min(grid.lane_width.max);
+        let found_at = Cell { kind, lane_width, spot_width, dead_end: axis.value(i) };
+        let Some(index) = grid.floor(&found_at) else { continue };
+        let cell = grid.cell(kind, index);
+        if found.last().is_some_and(|f| f.cell.lane_width >= cell.lane_width) {
+            continue;
+        }
+        let dead_end = dead_end(edges, boundary, lane_width, &found_at, axis.max);
+        let measured = Cell { dead_end, ..found_at };
+        found.push(Abstraction { measured, cell, index, shift });
+    }
+    found.sort_by(|a, b| {
+        let area = |f: &Abstraction| f.cell.lane_width * (f.cell.dead_end + grid.back);
+        area(b).total_cmp(&area(a))
+    });
+    found
+}
+
+/// Twice the smaller gap beside the spot's centre line; `None` when something stands on it.
+fn spot_width(edges: &[(Vec2, Vec2)], floor: f64, boundary: f64) -> Option<f64> {
+    let (mut left, mut right) = (f64::INFINITY, f64::INFINITY);
+    for &(a, b) in edges {
+        let Some((a, b)) = clip(a, b, 1, floor + TOUCH, boundary - TOUCH) else { continue };
+        let (x_min, x_max) = (a.x.min(b.x), a.x.max(b.x));
+        if x_min > 0.0 {
+            right = right.min(x_min);
+        } else if x_max < 0.0 {
+            left = left.min(-x_max);
+        } else {
+            return None;
+        }
+    }
+    Some(2.0 * left.min(right))
+}
+
+/// Where the lane really ends: the nearest x beyond the cell's dead end at which something
+/// enters a lane of this width, at most `max`.
+fn dead_end(edges: &[(Vec2, Vec2)], boundary: f64, width: f64, cell: &Cell, max: f64) -> f64 {
+    let top = boundary + width;
+    let entering = edges.iter().filter_map(|&(a, b)| {
+        let (a, b) = clip(a, b, 1, boundary + TOUCH, top - TOUCH)?;
+        let (a, b) = clip(a, b, 0, cell.dead_end - TOUCH, f64::INFINITY)?;
+        Some(a.x.min(b.x))
+    });
+    entering.fold(max, f64::min).max(cell.dead_end)
+}
+
+/// How far the cell must move out so that nothing at the spot's closed end enters it.
+fn bottom_shift(edges: &[(Vec2, Vec2)], kind: ParkingType, grid: &Grid) -> f64 {
+    let floor = -grid.lane_boundary(kind);
+    let smallest = grid.spot_width(kind).min / 2.0;
+    let tops = edges.iter().filter_map(|&(a, b)| {
+        let (a, b) = clip(a, b, 0, -smallest + TOUCH, smallest - TOUCH)?;
+        let (a, b) = clip(a, b, 1, floor + TOUCH, 0.0)?;
+        Some(a.y.max(b.y) - floor)
+    });
+    tops.fold(0.0, f64::max)
+}
+
+/// How far polygons and points of the spot's own row stand out into the lane.
+fn protrusion(obstacles: &Obstacles, kind: ParkingType, grid: &Grid) -> f64 {
+    let boundary = grid.lane_boundary(kind);
+    let (x_min, x_max) = (-grid.back, grid.dead_end.max);
+    let mut top = boundary;
+    for polygon in &obstacles.polygons {
+        if polygon.vertices().iter().all(|v| v.y >= boundary) {
+            continue;
+        }
+        for (a, b) in polygon.edges() {
+            if let Some((a, b)) = clip(a, b, 0, x_min, x_max) {
+                top = top.max(a.y.max(b.y));
+            }
+        }
+    }
+    for p in &obstacles.points {
+        if p.x > x_min && p.x < x_max && p.y < boundary + MAX_SHIFT {
+            top = top.max(p.y);
+        }
+    }
+    top - boundary
+}
+
+/// The part of `a`–`b` with `low ≤ coordinate ≤ high` on one axis (0 is x, 1 is y).
+fn clip(a: Vec2, b: Vec2, axis: usize, low: f64, high: f64) -> Option<(Vec2, Vec2)> {
+    let (pa, pb) = (a[axis], b[axis]);
+    if (pa < low && pb < low) || (pa > high && pb > high) {
+        return None;
+    }
+    let at = |limit: f64| a + (b - a) * ((limit - pa) / (pb - pa));
+    let cut = |p: Vec2, v: f64| {
+        if v < low {
+            at(low)
+        } else if v > high {
+            at(high)
+        } else {
+            p
+        }
+    };
+    Some((cut(a, pa), cut(b, pb)))
 }

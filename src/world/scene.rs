@@ -1,10 +1,19 @@
-//! A scene: what a user gives a planner. Read from JSON, TPCAP CSV, or generated.
+//! A scene: what a user gives a planner. Read from JSON or TPCAP CSV, or generated.
+//!
+//! A scene keeps its own (world) frame and the exact numbers of its file. What
+//! [`Scene::read`] returns has passed [`Scene::validate`]; whether start and goal are
+//! free of obstacles is asked later, by [`Problem`](crate::planners::Problem).
+//! The raw benchmark format is in [`tpcap`], the generator in [`generate`](super::generate).
 
+use std::collections::HashSet;
+use std::fs;
+use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, error::Category};
 
-use super::{Obstacles, ParkingType};
+use super::{Obstacles, ParkingType, tpcap};
 use crate::geometry::{Polygon, Pose, Vec2};
 use crate::vehicle::Vehicle;
 
@@ -40,13 +49,21 @@ pub struct Scene {
 /// A scene that cannot be used, and why.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
-    /// The file cannot be read.
-    #[error("{path}: cannot read scene: {error}")]
+    /// The file or folder cannot be read.
+    #[error("{path}: cannot read scene: {}", reason(error))]
     Read {
+        /// The file or folder.
+        path: PathBuf,
+        /// The operating system's reason.
+        error: io::Error,
+    },
+    /// The file cannot be written.
+    #[error("{path}: cannot write scene: {}", reason(error))]
+    Write {
         /// The file.
         path: PathBuf,
         /// The operating system's reason.
-        error: std::io::Error,
+        error: io::Error,
     },
     /// The file is not the format it should be.
     #[error("{path}: {message}")]
@@ -57,22 +74,174 @@ pub enum SceneError {
         message: String,
     },
     /// A field has a value that no scene can have.
-    #[error("{path}: {field}: {message}")]
+    #[error("{path}: {field} {message}")]
     Invalid {
         /// The file (or the scene's name).
         path: PathBuf,
         /// The field.
         field: String,
-        /// What is wrong and what would be right.
+        /// What is wrong and what would be right; continues a sentence that begins
+        /// with the field.
         message: String,
     },
 }
 
+/// The operating system's reason in plain words, without its error number.
+fn reason(error: &io::Error) -> String {
+    match error.kind() {
+        ErrorKind::NotFound => "no such file or folder".to_owned(),
+        ErrorKind::PermissionDenied => "permission denied".to_owned(),
+        ErrorKind::IsADirectory => "it is a folder, not a file".to_owned(),
+        ErrorKind::NotADirectory => "it is a file, not a folder".to_owned(),
+        _ => error.to_string(),
+    }
+}
+
 impl Scene {
+    /// Largest |coordinate| of a scene, metres: beyond it `f64` no longer resolves
+    /// what the collision check relies on.
+    pub const MAX_COORDINATE: f64 = 1e7;
+
     /// Reads one scene from `.json` (the scene format) or `.csv` (TPCAP) and validates it.
+    /// A scene without a name gets its file's.
     pub fn read(path: &Path) -> Result<Scene, SceneError> {
-        let _ = path;
-        unimplemented!("helper")
+        let format = |message: String| SceneError::Format { path: path.to_owned(), message };
+        let Some(kind) = FileKind::of(path) else {
+            return Err(format("not a scene file; expected .json or a TPCAP .csv".to_owned()));
+        };
+        let bytes =
+            fs::read(path).map_err(|error| SceneError::Read { path: path.to_owned(), error })?;
+        let text = String::from_utf8(bytes)
+            .map_err(|_| format("is not text (UTF-8); expected a scene file".to_owned()))?;
+        let text = text.trim_start_matches('\u{feff}');
+        if text.trim().is_empty() {
+            return Err(format("is empty; expected one scene".to_owned()));
+        }
+        let mut scene = match kind {
+            FileKind::Json => parse_json(text, path)?,
+            FileKind::Tpcap => tpcap::parse(text, path)?,
+        };
+        if scene.name.is_empty() {
+            scene.name = stem(path);
+        }
+        scene.validate(path)?;
+        Ok(scene)
+    }
+
+    /// Reads every `.json` and `.csv` file of a folder, in the order of their names.
+    /// A scene whose name another one has already is called after its file instead, so
+    /// that names are unique.
+    pub fn read_dir(dir: &Path) -> Result<Vec<Scene>, SceneError> {
+        let read = |error| SceneError::Read { path: dir.to_owned(), error };
+        let mut paths = Vec::new();
+        for entry in fs::read_dir(dir).map_err(read)? {
+            let path = entry.map_err(read)?.path();
+            if FileKind::of(&path).is_some() && path.is_file() {
+                paths.push(path);
+            }
+        }
+        if paths.is_empty() {
+            return Err(SceneError::Format {
+                path: dir.to_owned(),
+                message: "holds no scene; expected .json or TPCAP .csv files".to_owned(),
+            });
+        }
+        paths.sort();
+        let mut taken = HashSet::new();
+        let mut scenes = Vec::with_capacity(paths.len());
+        for path in paths {
+            let mut scene = Scene::read(&path)?;
+            if taken.contains(&scene.name) {
+                scene.name = stem(&path);
+            }
+            if taken.contains(&scene.name) {
+                scene.name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            }
+            taken.insert(scene.name.clone());
+            scenes.push(scene);
+        }
+        Ok(scenes)
+    }
+
+    /// Writes the scene as JSON, every number exactly as it is. The file appears whole
+    /// or not at all.
+    pub fn write(&self, path: &Path) -> Result<(), SceneError> {
+        self.validate(path)?;
+        let error = |error| SceneError::Write { path: path.to_owned(), error };
+        let json = serde_json::to_string(self).map_err(|e| error(e.into()))?;
+        let mut name = path.file_name().unwrap_or_default().to_owned();
+        name.push(".tmp");
+        let temporary = path.with_file_name(name);
+        let written = fs::File::create(&temporary)
+            .and_then(|mut file| {
+                file.write_all(json.as_bytes())?;
+                file.write_all(b"\n")?;
+                file.sync_all()
+            })
+            .and_then(|()| fs::rename(&temporary, path));
+        written.map_err(|e| {
+            // The first error is the one to report; a leftover is no worse than that.
+            let _ = fs::remove_file(&temporary);
+            error(e)
+        })
+    }
+
+    /// Checks every number. `path` is where the scene comes from, for the message.
+    pub fn validate(&self, path: &Path) -> Result<(), SceneError> {
+        let invalid = |field: String, message: String| {
+            Err(SceneError::Invalid { path: path.to_owned(), field, message })
+        };
+        let numbers = |field: &dyn Fn() -> String, values: &[f64]| {
+            let Some(v) = values.iter().find(|v| !(v.abs() <= Self::MAX_COORDINATE)) else {
+                return Ok(());
+            };
+            let message = if v.is_finite() {
+                "is too large; coordinates must lie within ±1e7 (subtract the map's offset)"
+            } else {
+                "is not finite; every value must be a finite number"
+            };
+            invalid(field(), format!("= {values:?} {message}"))
+        };
+        if let Err(e) = self.vehicle.validate() {
+            let message = format!("is {}; it must be {}", e.value, e.expected);
+            return invalid(format!("vehicle.{}", e.field), message);
+        }
+        numbers(&|| "start".to_owned(), &<[f64; 3]>::from(self.start))?;
+        numbers(&|| "goal".to_owned(), &<[f64; 3]>::from(self.goal))?;
+        for (i, polygon) in self.obstacles.iter().enumerate() {
+            for (j, vertex) in polygon.iter().enumerate() {
+                numbers(&|| format!("obstacles[{i}][{j}]"), vertex)?;
+            }
+            if polygon.len() < 3 {
+                let n = polygon.len();
+                return invalid(
+                    format!("obstacles[{i}]"),
+                    format!("has {n} vertices; a polygon needs at least 3 (or use \"points\")"),
+                );
+            }
+        }
+        for (i, point) in self.points.iter().enumerate() {
+            numbers(&|| format!("points[{i}]"), point)?;
+        }
+        if let Some(b) = self.bounds {
+            numbers(&|| "bounds".to_owned(), &b)?;
+            if b[0] >= b[2] || b[1] >= b[3] {
+                return invalid(
+                    "bounds".to_owned(),
+                    format!(
+                        "= {b:?}; expected [xmin, ymin, xmax, ymax] with each min below its max"
+                    ),
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// The name with everything replaced by `_` that does not belong into a file name.
+    pub fn file_stem(&self) -> String {
+        let safe = |c: char| if c.is_alphanumeric() || "-_.@+ ".contains(c) { c } else { '_' };
+        let stem: String = self.name.chars().map(safe).collect();
+        if stem.starts_with('.') { format!("_{stem}") } else { stem }
     }
 
     /// The obstacles as geometry, in the scene's frame. Call after [`Scene::validate`].
@@ -86,5 +255,112 @@ impl Scene {
                 .collect(),
             points: self.points.iter().map(vec).collect(),
         }
+    }
+}
+
+/// What a scene file holds, by its extension.
+#[derive(Clone, Copy)]
+enum FileKind {
+    Json,
+    Tpcap,
+}
+
+impl FileKind {
+    fn of(path: &Path) -> Option<FileKind> {
+        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+            "json" => Some(FileKind::Json),
+            "csv" => Some(FileKind::Tpcap),
+            _ => None,
+        }
+    }
+}
+
+/// The file's name without folder and extension.
+pub(super) fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+fn parse_json(text: &str, path: &Path) -> Result<Scene, SceneError> {
+    let error = match serde_json::from_str(text) {
+        Ok(scene) => return Ok(scene),
+        Err(error) => error,
+    };
+    // The slow way, only for a message that names the field: first the syntax alone,
+    // then the shapes, then what serde says.
+    let message = match serde_json::from_str::<Value>(text) {
+        Err(syntax) => match (word_at(text, &syntax), syntax.classify()) {
+            (Some(word), _) => format!(
+                "{word} at line {} column {} is not a number; every value must be finite",
+                syntax.line(),
+                syntax.column()
+            ),
+            (None, Category::Eof) => format!("is cut short: {syntax}"),
+            (None, _) => format!("is not valid JSON: {syntax}"),
+        },
+        Ok(value) => match misshapen(&value) {
+            Some((field, message)) => {
+                return Err(SceneError::Invalid { path: path.to_owned(), field, message });
+            }
+            None => format!("is not a scene: {error}"),
+        },
+    };
+    Err(SceneError::Format { path: path.to_owned(), message })
+}
+
+/// The `NaN` or `Infinity` that a JSON syntax error stopped at.
+fn word_at<'a>(text: &'a str, error: &serde_json::Error) -> Option<&'a str> {
+    let line = text.lines().nth(error.line().checked_sub(1)?)?;
+    let belongs = |c: char| c.is_ascii_alphabetic() || c == '-' || c == '+';
+    let mut from = 0;
+    line.split(|c| !belongs(c)).find(|word| {
+        let range = from..=from + word.len() + 1;
+        from += word.len() + 1;
+        let name = word.trim_start_matches(['-', '+']).to_ascii_lowercase();
+        range.contains(&error.column()) && ["nan", "inf", "infinity"].contains(&name.as_str())
+    })
+}
+
+/// The first geometric field that is not the numbers it should be.
+fn misshapen(scene: &Value) -> Option<(String, String)> {
+    let list = |field: &str| {
+        let items = scene.get(field).and_then(Value::as_array);
+        items.into_iter().flatten().enumerate()
+    };
+    let pose = |field: &str| not_numbers(scene.get(field)?, 3, field.to_owned());
+    let bounds = scene.get("bounds").filter(|b| !b.is_null());
+    pose("start")
+        .or_else(|| pose("goal"))
+        .or_else(|| not_numbers(bounds?, 4, "bounds".to_owned()))
+        .or_else(|| {
+            list("points").find_map(|(i, point)| not_numbers(point, 2, format!("points[{i}]")))
+        })
+        .or_else(|| {
+            list("obstacles").find_map(|(i, polygon)| {
+                let Some(vertices) = polygon.as_array() else {
+                    let message = format!("is {}; expected a list of [x, y]", brief(polygon));
+                    return Some((format!("obstacles[{i}]"), message));
+                };
+                let field = |j| format!("obstacles[{i}][{j}]");
+                vertices.iter().enumerate().find_map(|(j, v)| not_numbers(v, 2, field(j)))
+            })
+        })
+}
+
+/// What is wrong with `value`, where `count` numbers are expected.
+fn not_numbers(value: &Value, count: usize, field: String) -> Option<(String, String)> {
+    let numbers = value.as_array().is_some_and(|v| v.iter().all(Value::is_number));
+    let length = value.as_array().map_or(0, Vec::len);
+    if numbers && length == count {
+        return None;
+    }
+    Some((field, format!("is {}; expected {count} finite numbers", brief(value))))
+}
+
+/// The value as JSON, cut to a readable length.
+fn brief(value: &Value) -> String {
+    let json = value.to_string();
+    match json.char_indices().nth(60) {
+        Some((end, _)) => format!("{}…", &json[..end]),
+        None => json,
     }
 }

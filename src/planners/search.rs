@@ -1,0 +1,263 @@
+//! The best-first search of Hybrid A*: open queue, node arena, expansion.
+//!
+//! The search runs *from the goal*: driving is reversible, and near the goal space is
+//! tight. A node's motion leads forward in time from the node to its parent, so that the
+//! way from a node to the goal is read off by walking up to the root. What is estimated is
+//! the cost from the start to the node.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use crate::curves::Segment;
+use crate::geometry::{Aabb, Pose, wrap_angle};
+use crate::vehicle::{Gear, Vehicle};
+use crate::world::collision::Sweep;
+
+use super::analytic::GoalSet;
+use super::cost::{CostModel, DriveState};
+use super::cost_to_go::CostToGo;
+use super::hybrid_astar::{HybridAStarConfig, Resolution, inscribed_radius};
+use super::lattice::Lattice;
+use super::nonholonomic::NonHolonomic;
+use super::Problem;
+
+/// Why the queue ran empty.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stop {
+    /// The wave from the start never reaches the goal.
+    Enclosed,
+    /// Everything reachable was expanded.
+    Exhausted,
+}
+
+/// Index of a node in the arena.
+pub(super) type NodeIndex = u32;
+
+/// In place of a primitive: the node is a root.
+const ROOT: u32 = u32::MAX;
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    pose: Pose,
+    /// Cost from here to the goal.
+    cost: f32,
+    /// Estimated cost from the start to here.
+    to_come: f32,
+    /// The node that `primitive` leads to; for a root the index of its goal-set entry.
+    parent: NodeIndex,
+    /// Index of the motion; `ROOT` for a root.
+    primitive: u32,
+}
+
+/// An open node; ordered so that the heap pops the least f, then the earliest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Open {
+    f: f32,
+    node: NodeIndex,
+}
+
+impl Eq for Open {}
+
+impl Ord for Open {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.f.total_cmp(&self.f).then(other.node.cmp(&self.node))
+    }
+}
+
+impl PartialOrd for Open {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+/// A motion primitive.
+#[derive(Clone, Debug)]
+struct Primitive {
+    /// The motion, forward in time.
+    segment: Segment,
+    /// What the reversed motion sweeps.
+    sweep: Sweep,
+    /// Its steering angle, radians.
+    steer: f64,
+}
+
+/// One search at a time; buffers are reused between searches.
+#[derive(Debug, Default)]
+pub(super) struct Search {
+    nodes: Vec<Node>,
+    open: BinaryHeap<Open>,
+    lattice: Lattice,
+    cost_to_go: CostToGo,
+    nonholonomic: NonHolonomic,
+    primitives: Vec<Primitive>,
+    start: Pose,
+    weight: f32,
+    enclosed: bool,
+    /// Expansions since a curve was last tried.
+    since_curve: u32,
+}
+
+impl Search {
+    /// Starts a search from `goal` to `start` within `domain`.
+    pub fn begin(
+        &mut self,
+        config: &HybridAStarConfig,
+        resolution: &Resolution,
+        problem: &Problem,
+        domain: Aabb,
+        start: Pose,
+        goal: &GoalSet,
+    ) {
+        let vehicle = &problem.vehicle;
+        self.start = start;
+        self.weight = config.heuristic_weight as f32;
+        self.nodes.clear();
+        self.open.clear();
+        self.since_curve = 0;
+        self.lattice.reset(&domain, resolution.cell, resolution.headings);
+        self.nonholonomic.reset(vehicle);
+        let radius = inscribed_radius(vehicle);
+        let cell = config.cost_to_go_cell;
+        self.cost_to_go.reset(&domain, cell, radius, &problem.obstacles, start);
+        self.prepare_primitives(resolution, vehicle, problem.collision.footprint());
+        self.enclosed = !self.cost_to_go.distance(goal.pose.position()).is_finite();
+        if self.enclosed {
+            return;
+        }
+        for (i, entry) in goal.entries().iter().enumerate() {
+            let to_come = self.heuristic(entry.pose, vehicle, &config.cost);
+            let Some(state) = self.lattice.state(entry.pose) else { continue };
+            let cost = entry.cost() as f32;
+            if to_come.is_finite() && cost < self.lattice.cost(state) {
+                self.lattice.set_cost(state, cost);
+                let parent = i as NodeIndex;
+                self.push(Node { pose: entry.pose, cost, to_come, parent, primitive: ROOT });
+            }
+        }
+    }
+
+    fn prepare_primitives(
+        &mut self,
+        resolution: &Resolution,
+        vehicle: &Vehicle,
+        footprint: &Aabb,
+    ) {
+        self.primitives.clear();
+        let half = (resolution.steers / 2) as i32;
+        for gear in [Gear::Forward, Gear::Backward] {
+            for i in -half..=half {
+                let steer = vehicle.max_steer * f64::from(i) / f64::from(half);
+                let segment = Segment {
+                    curvature: steer.tan() / vehicle.wheelbase,
+                    length: gear.sign() * resolution.step,
+                };
+                // Swept in reverse: from the node it leads to.
+                let sweep = Sweep::new(footprint, segment.reversed());
+                self.primitives.push(Primitive { segment, sweep, steer });
+            }
+        }
+    }
+
+    /// Takes the open node of least f that is still the best of its state.
+    pub fn pop(&mut self) -> Option<NodeIndex> {
+        while let Some(Open { node, .. }) = self.open.pop() {
+            let n = self.nodes[node as usize];
+            // A cheaper way to the same state was found after this one was queued.
+            let stale = self.lattice.state(n.pose).is_some_and(|s| self.lattice.cost(s) < n.cost);
+            if !stale {
+                return Some(node);
+            }
+        }
+        None
+    }
+
+    /// Why the queue is empty.
+    pub fn stop(&self) -> Stop {
+        if self.enclosed { Stop::Enclosed } else { Stop::Exhausted }
+    }
+
+    /// Whether a curve from the start to `node` should be tried: rarely far from the start,
+    /// always close to it.
+    pub fn wants_curve(&mut self, node: NodeIndex) -> bool {
+        self.since_curve += 1;
+        let wants = self.since_curve as f32 * 4.0 >= self.nodes[node as usize].to_come;
+        if wants {
+            self.since_curve = 0;
+        }
+        wants
+    }
+
+    /// The pose of `node`.
+    pub fn pose(&self, node: NodeIndex) -> Pose {
+        self.nodes[node as usize].pose
+    }
+
+    /// The gear and steering with which the way from `node` to the goal begins.
+    pub fn departure(&self, node: NodeIndex, goal: &GoalSet) -> DriveState {
+        let n = &self.nodes[node as usize];
+        match self.primitives.get(n.primitive as usize) {
+            Some(p) => DriveState { gear: Some(p.segment.gear()), steer: p.steer },
+            None => goal.entries()[n.parent as usize].departure(),
+        }
+    }
+
+    /// Generates the predecessors of `node`.
+    pub fn expand(
+        &mut self,
+        node: NodeIndex,
+        goal: &GoalSet,
+        config: &HybridAStarConfig,
+        problem: &Problem,
+    ) {
+        let parent = self.nodes[node as usize];
+        let state = self.departure(node, goal);
+        for i in 0..self.primitives.len() {
+            let p = &self.primitives[i];
+            let pose = p.sweep.segment().end(parent.pose);
+            let pose = Pose { heading: wrap_angle(pose.heading), ..pose };
+            // Costs of changes are symmetric: the state after may stand for the one before.
+            let (step_cost, _) = config.cost.segment(state, p.segment.length, p.steer);
+            let cost = parent.cost + step_cost as f32;
+            let Some(lattice_state) = self.lattice.state(pose) else { continue };
+            if cost >= self.lattice.cost(lattice_state)
+                || !problem.collision.sweep_is_free(parent.pose, &p.sweep)
+            {
+                continue;
+            }
+            let to_come = self.heuristic(pose, &problem.vehicle, &config.cost);
+            if !to_come.is_finite() {
+                continue;
+            }
+            self.lattice.set_cost(lattice_state, cost);
+            self.push(Node { pose, cost, to_come, parent: node, primitive: i as u32 });
+        }
+    }
+
+    fn push(&mut self, node: Node) {
+        let index = self.nodes.len() as NodeIndex;
+        self.nodes.push(node);
+        self.open.push(Open { f: node.cost + self.weight * node.to_come, node: index });
+    }
+
+    /// The larger of the two estimates of the cost from the start to `pose`.
+    fn heuristic(&mut self, pose: Pose, vehicle: &Vehicle, model: &CostModel) -> f32 {
+        let per_metre = model.forward.min(model.backward);
+        let among_obstacles = self.cost_to_go.distance(pose.position()) * per_metre;
+        if !among_obstacles.is_finite() {
+            return f32::INFINITY;
+        }
+        let curve = self.nonholonomic.cost(self.start.relative(pose), vehicle, model);
+        among_obstacles.max(curve) as f32
+    }
+
+    /// The motions from `node` to the goal, in driving order, and the root's goal-set entry.
+    pub fn way(&self, node: NodeIndex) -> (Vec<Segment>, usize) {
+        let mut segments = Vec::new();
+        let mut n = &self.nodes[node as usize];
+        while n.primitive != ROOT {
+            segments.push(self.primitives[n.primitive as usize].segment);
+            n = &self.nodes[n.parent as usize];
+        }
+        (segments, n.parent as usize)
+    }
+}

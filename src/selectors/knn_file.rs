@@ -1,0 +1,296 @@
+//! The file format `knn.bin`, version 1.
+//!
+//! All numbers are little-endian. Nothing needs alignment, so the file is used as mapped.
+//!
+//! | bytes | content |
+//! |---|---|
+//! | 8 | magic `N3P-KNN` and a zero |
+//! | 4 | format version |
+//! | 4 | length of the header |
+//! | 8 | length of the payload |
+//! | 32 | SHA-256 of the 24 bytes above, the header and the payload |
+//! | … | header: [`KnnHeader`] as JSON |
+//! | … | payload: for each entry of [`KnnHeader::kinds`] three arrays |
+//!
+//! The arrays of a parking type: `cells + 1` offsets (u32), where cell `i` owns the samples
+//! `offsets[i]..offsets[i + 1]`; the starts (3 × i16 each); the preparatory poses
+//! (3 × 24-bit integer each). Positions count in `extent / 32767` metres for starts, which
+//! only enter a distance, and in `extent / 8388607` metres for poses; headings in
+//! π / 32767 and π / 8388607 radians. With an extent of 16 m a pose is exact to 1 µm and
+//! 0.2 µrad, some thousand times below the planner's clearance margin
+//! ([`crate::planners::Problem::MARGIN`]), so rounding does not take its free Reeds-Shepp
+//! connection away. A sample takes 15 bytes.
+
+use std::f64::consts::PI;
+use std::fs::File;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use memmap2::Mmap;
+use serde::{Deserialize, Serialize};
+
+use super::artefact::{self, ArtefactError, Fault};
+use crate::geometry::{Pose, wrap_angle};
+use crate::vehicle::Vehicle;
+use crate::world::ParkingType;
+use crate::world::cell::Grid;
+
+/// First bytes of every `knn.bin`.
+pub const MAGIC: [u8; 8] = *b"N3P-KNN\0";
+/// The format version written and read by this program.
+pub const VERSION: u32 = 1;
+
+const PREAMBLE: usize = 56;
+const CHECKSUM: Range<usize> = 24..56;
+const START_BYTES: usize = 6;
+const POSE_BYTES: usize = 9;
+const START_STEPS: f64 = 32_767.0;
+const POSE_STEPS: f64 = 8_388_607.0;
+
+/// What a `knn.bin` says about itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KnnHeader {
+    /// The vehicle the samples were driven with.
+    pub vehicle: Vehicle,
+    /// The grid of cells.
+    pub grid: Grid,
+    /// Metres per radian of the metric's heading part; see [`super::knn`].
+    pub heading_radius: f64,
+    /// No coordinate exceeds this, metres; it scales the integers.
+    pub extent: f64,
+    /// The parking types, in the order of the payload.
+    pub kinds: Vec<KindHeader>,
+    /// SHA-256 of the data set, lower-case hexadecimal.
+    pub data_sha256: String,
+    /// Seed of the data set.
+    pub seed: u64,
+    /// Version of this crate at training.
+    pub crate_version: String,
+}
+
+/// One parking type of a `knn.bin`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KindHeader {
+    /// The parking type.
+    pub kind: ParkingType,
+    /// Number of cells of the grid.
+    pub cells: usize,
+    /// Number of samples.
+    pub samples: usize,
+}
+
+/// One stored sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KnnEntry {
+    /// Index of its cell.
+    pub cell: u32,
+    /// Rear-axle start, spot frame.
+    pub start: Pose,
+    /// Rear-axle preparatory pose, spot frame.
+    pub preparatory: Pose,
+}
+
+/// The bytes of a file. `entries`: the samples of each of [`KnnHeader::kinds`], sorted by
+/// cell; a sample's order within its cell breaks ties between equally near neighbours.
+pub fn encode(header: &KnnHeader, entries: &[Vec<KnnEntry>]) -> Vec<u8> {
+    let json = serde_json::to_vec(header).expect("a header is plain data");
+    let mut payload = Vec::new();
+    for (kind, entries) in header.kinds.iter().zip(entries) {
+        for cell in 0..=kind.cells {
+            let offset = entries.partition_point(|e| (e.cell as usize) < cell) as u32;
+            payload.extend(offset.to_le_bytes());
+        }
+        for e in entries {
+            for v in steps(e.start, header.extent, START_STEPS) {
+                payload.extend((v as i16).to_le_bytes());
+            }
+        }
+        for e in entries {
+            for v in steps(e.preparatory, header.extent, POSE_STEPS) {
+                payload.extend(&v.to_le_bytes()[..3]);
+            }
+        }
+    }
+    let mut bytes = MAGIC.to_vec();
+    bytes.extend(VERSION.to_le_bytes());
+    bytes.extend((json.len() as u32).to_le_bytes());
+    bytes.extend((payload.len() as u64).to_le_bytes());
+    let sum = artefact::sha256(&[&bytes, &json, &payload]);
+    bytes.extend(sum);
+    bytes.extend(json);
+    bytes.extend(payload);
+    bytes
+}
+
+/// A mapped and checked `knn.bin`.
+#[derive(Debug)]
+pub struct KnnFile {
+    map: Mmap,
+    path: PathBuf,
+    header: KnnHeader,
+    sections: Vec<Section>,
+}
+
+/// Where the arrays of one parking type begin in the file.
+#[derive(Debug)]
+struct Section {
+    offsets: usize,
+    starts: usize,
+    poses: usize,
+}
+
+impl KnnFile {
+    /// Maps and checks a file.
+    ///
+    /// The mapping stays valid when the file is replaced, as this program does (by
+    /// renaming); a file that another program truncates in place ends the process.
+    pub fn open(path: &Path) -> Result<Self, ArtefactError> {
+        let map = map(&artefact::open(path)?).map_err(|e| Fault::Unreadable(e).of(path))?;
+        let (header, sections) = check(&map).map_err(|fault| fault.of(path))?;
+        Ok(Self { map, path: path.to_owned(), header, sections })
+    }
+
+    /// The file's header.
+    pub fn header(&self) -> &KnnHeader {
+        &self.header
+    }
+
+    /// The file itself.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The samples of a cell. `kind` is a position in [`KnnHeader::kinds`].
+    pub fn samples(&self, kind: usize, cell: usize) -> Range<usize> {
+        let at = self.sections[kind].offsets + 4 * cell;
+        u32_at(&self.map, at) as usize..u32_at(&self.map, at + 4) as usize
+    }
+
+    /// The start of a sample, spot frame.
+    pub fn start(&self, kind: usize, sample: usize) -> Pose {
+        let at = self.sections[kind].starts + START_BYTES * sample;
+        let bytes = &self.map[at..at + START_BYTES];
+        let v = [0, 2, 4].map(|i| i32::from(i16::from_le_bytes([bytes[i], bytes[i + 1]])));
+        pose(v, self.header.extent, START_STEPS)
+    }
+
+    /// The preparatory pose of a sample, spot frame.
+    pub fn preparatory(&self, kind: usize, sample: usize) -> Pose {
+        let at = self.sections[kind].poses + POSE_BYTES * sample;
+        let bytes = &self.map[at..at + POSE_BYTES];
+        // The sign sits in the third byte: place the three above an empty one and shift.
+        let v =
+            [0, 3, 6].map(|i| i32::from_le_bytes([0, bytes[i], bytes[i + 1], bytes[i + 2]]) >> 8);
+        pose(v, self.header.extent, POSE_STEPS)
+    }
+}
+
+fn map(file: &File) -> std::io::Result<Mmap> {
+    // SAFETY: models are only ever replaced by renaming, never changed in place, so the
+    // mapped bytes stay as they were checked.
+    unsafe { Mmap::map(file) }
+}
+
+fn check(bytes: &[u8]) -> Result<(KnnHeader, Vec<Section>), Fault> {
+    if bytes.is_empty() {
+        return Err(Fault::Empty);
+    }
+    let got = bytes.len() as u64;
+    if bytes.len() < MAGIC.len() || bytes[..MAGIC.len()] != MAGIC {
+        return Err(Fault::NotAModel);
+    }
+    if bytes.len() < PREAMBLE {
+        return Err(Fault::Length { expected: PREAMBLE as u64, got });
+    }
+    let found = u32_at(bytes, 8);
+    if found != VERSION {
+        return Err(Fault::Version { found, supported: VERSION });
+    }
+    let header_len = u32_at(bytes, 12) as usize;
+    let payload_len = u64::from_le_bytes(bytes[16..24].try_into().expect("eight bytes"));
+    let expected = (PREAMBLE + header_len) as u64;
+    let expected = expected.saturating_add(payload_len);
+    if got != expected {
+        return Err(Fault::Length { expected, got });
+    }
+    if artefact::sha256(&[&bytes[..CHECKSUM.start], &bytes[PREAMBLE..]]) != bytes[CHECKSUM] {
+        return Err(Fault::Checksum);
+    }
+    let payload = PREAMBLE + header_len;
+    let header: KnnHeader = serde_json::from_slice(&bytes[PREAMBLE..payload])
+        .map_err(|e| Fault::Header(e.to_string()))?;
+    let sections = sections(bytes, payload, &header).map_err(Fault::Header)?;
+    Ok((header, sections))
+}
+
+/// Lays out the payload. The checksum has vouched for the bytes; this guards against
+/// headers that were never right.
+fn sections(bytes: &[u8], payload: usize, header: &KnnHeader) -> Result<Vec<Section>, String> {
+    header.vehicle.validate().map_err(|e| e.to_string())?;
+    header.grid.validate().map_err(|e| e.to_string())?;
+    for (name, v) in [("heading_radius", header.heading_radius), ("extent", header.extent)] {
+        if !(v.is_finite() && v > 0.0) {
+            return Err(format!("{name} is {v}; expected a positive number"));
+        }
+    }
+    let mut at = payload;
+    let mut sections = Vec::new();
+    for k in &header.kinds {
+        let cells = header.grid.cell_count(k.kind);
+        if k.cells != cells {
+            return Err(format!("{}: expected {cells} cells, got {}", k.kind, k.cells));
+        }
+        let size = k
+            .samples
+            .checked_mul(START_BYTES + POSE_BYTES)
+            .and_then(|n| n.checked_add(4 * (cells + 1)))
+            .filter(|n| *n <= bytes.len() - at)
+            .ok_or_else(|| format!("{}: {} samples do not fit", k.kind, k.samples))?;
+        let starts = at + 4 * (cells + 1);
+        let section = Section { offsets: at, starts, poses: starts + START_BYTES * k.samples };
+        let offset = |i: usize| u32_at(bytes, at + 4 * i) as usize;
+        let rising = (0..cells).all(|i| offset(i) <= offset(i + 1));
+        if offset(0) != 0 || offset(cells) != k.samples || !rising {
+            return Err(format!("{}: the offsets of the cells do not rise in order", k.kind));
+        }
+        sections.push(section);
+        at += size;
+    }
+    if at != bytes.len() {
+        return Err(format!("{} bytes are left over", bytes.len() - at));
+    }
+    Ok(sections)
+}
+
+fn u32_at(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"))
+}
+
+fn steps(pose: Pose, extent: f64, steps: f64) -> [i32; 3] {
+    let heading = wrap_angle(pose.heading) / PI;
+    [pose.x / extent, pose.y / extent, heading].map(|v| (v * steps).round() as i32)
+}
+
+fn pose([x, y, heading]: [i32; 3], extent: f64, steps: f64) -> Pose {
+    let length = extent / steps;
+    Pose::new(f64::from(x) * length, f64::from(y) * length, f64::from(heading) * (PI / steps))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::signed_angle;
+
+    #[test]
+    fn poses_keep_their_micrometres() {
+        for p in [Pose::new(-15.99, 6.5, PI), Pose::new(3.1, -0.2, -3.1), Pose::default()] {
+            let fine = pose(steps(p, 16.0, POSE_STEPS), 16.0, POSE_STEPS);
+            assert!(fine.distance(p) < 1.5e-6, "{p:?} {fine:?}");
+            assert!(signed_angle(fine.heading, p.heading).abs() < 2e-7, "{p:?} {fine:?}");
+            let coarse = pose(steps(p, 16.0, START_STEPS), 16.0, START_STEPS);
+            assert!(coarse.distance(p) < 4e-4, "{p:?} {coarse:?}");
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! The paper's network, 6 → 256 → 256 → 256 → 128 → 4 with ReLU, evaluated without a
+//! framework.
+//!
+//! One sample at a time, plain loops over single precision. A layer's outputs are
+//! computed in blocks whose sums stay in registers while the block's weights are read once,
+//! in order; inputs that ReLU has zeroed are skipped. Every output adds its terms in the same
+//! order with separate multiplication and addition, so that results are the same bits on
+//! every machine, whatever its vector width.
+
+use super::Features;
+use crate::geometry::Pose;
+
+/// Widths of the layers, input and output included (paper, section IV).
+pub const LAYERS: [usize; 6] = [Features::COUNT, 256, 256, 256, 128, OUTPUTS];
+/// Number of outputs: `(x, y, cos θ, sin θ)` of the preparatory pose.
+pub const OUTPUTS: usize = 4;
+
+/// Outputs per block: eight registers of four numbers on the plainest x86-64.
+const BLOCK: usize = 32;
+const WIDEST: usize = 256;
+
+/// Weights of one fully connected layer, as stored in a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LayerWeights {
+    /// `[outputs, inputs]`, row after row.
+    pub weight: Vec<f32>,
+    /// `[outputs]`.
+    pub bias: Vec<f32>,
+}
+
+/// A pose as the network's raw outputs: metres, metres, cosine, sine.
+pub fn outputs_from_pose(pose: Pose) -> [f32; OUTPUTS] {
+    let (sin, cos) = pose.sin_cos();
+    [pose.x, pose.y, cos, sin].map(|v| v as f32)
+}
+
+/// The pose of raw outputs; cosine and sine need not be normalised.
+pub fn pose_from_outputs([x, y, cos, sin]: [f32; OUTPUTS]) -> Pose {
+    let [x, y, cos, sin] = [x, y, cos, sin].map(f64::from);
+    Pose::new(x, y, sin.atan2(cos))
+}
+
+/// The network, laid out for evaluation.
+#[derive(Clone, Debug)]
+pub struct Network {
+    layers: Vec<Dense>,
+}
+
+#[derive(Clone, Debug)]
+struct Dense {
+    inputs: usize,
+    /// One per block of outputs; padded with zeros.
+    bias: Vec<[f32; BLOCK]>,
+    /// Block after block; in a block one row per input.
+    weight: Vec<[f32; BLOCK]>,
+}
+
+impl Dense {
+    fn new(inputs: usize, outputs: usize, weights: &LayerWeights) -> Self {
+        let blocks = outputs.div_ceil(BLOCK);
+        let mut bias = vec![[0.0; BLOCK]; blocks];
+        let mut weight = vec![[0.0; BLOCK]; blocks * inputs];
+        for o in 0..outputs {
+            let (block, lane) = (o / BLOCK, o % BLOCK);
+            bias[block][lane] = weights.bias[o];
+            for i in 0..inputs {
+                weight[block * inputs + i][lane] = weights.weight[o * inputs + i];
+            }
+        }
+        Self { inputs, bias, weight }
+    }
+
+    #[inline(always)]
+    fn forward(&self, active: &[(usize, f32)], out: &mut [[f32; BLOCK]; WIDEST / BLOCK]) {
+        let blocks = self.bias.iter().zip(self.weight.chunks_exact(self.inputs));
+        for ((bias, rows), out) in blocks.zip(out) {
+            let mut sums = *bias;
+            for &(i, v) in active {
+                let row = &rows[i];
+                for (sum, w) in sums.iter_mut().zip(row) {
+                    *sum += v * w;
+                }
+            }
+            *out = sums;
+        }
+    }
+}
+
+impl Network {
+    /// Lays out the weights of [`LAYERS`].
+    ///
+    /// Panics when their sizes are not those of [`LAYERS`].
+    pub fn new(weights: &[LayerWeights]) -> Self {
+        assert_eq!(weights.len(), LAYERS.len() - 1, "one set of weights per layer");
+        let layers = weights.iter().zip(LAYERS.windows(2)).map(|(weights, size)| {
+            assert_eq!(weights.weight.len(), size[0] * size[1], "weights of {size:?}");
+            assert_eq!(weights.bias.len(), size[1], "biases of {size:?}");
+            Dense::new(size[0], size[1], weights)
+        });
+        Self { layers: layers.collect() }
+    }
+
+    /// Normalised features → normalised outputs.
+    pub fn forward(&self, input: [f32; Features::COUNT]) -> [f32; OUTPUTS] {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.forward_avx2(input) };
+        }
+        self.forward_plain(input)
+    }
+
+    /// The same loops compiled for eight numbers per register; FMA stays off, for its
+    /// rounding would differ.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn forward_avx2(&self, input: [f32; Features::COUNT]) -> [f32; OUTPUTS] {
+        self.forward_plain(input)
+    }
+
+    #[inline(always)]
+    fn forward_plain(&self, input: [f32; Features::COUNT]) -> [f32; OUTPUTS] {
+        let mut values = [[0.0_f32; BLOCK]; WIDEST / BLOCK];
+        let mut active = [(0_usize, 0.0_f32); WIDEST];
+        let mut count = input.len();
+        for (i, v) in input.into_iter().enumerate() {
+            active[i] = (i, v);
+        }
+        let last = self.layers.len() - 1;
+        for (layer, outputs) in self.layers.iter().zip(&LAYERS[1..]).take(last) {
+            layer.forward(&active[..count], &mut values);
+            // ReLU, keeping the positive ones; written without a branch.
+            count = 0;
+            for (i, &v) in values.as_flattened()[..*outputs].iter().enumerate() {
+                active[count] = (i, v);
+                count += usize::from(v > 0.0);
+            }
+        }
+        self.layers[last].forward(&active[..count], &mut values);
+        std::array::from_fn(|i| values[0][i])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::RngExt;
+
+    /// Values around what He initialisation gives.
+    fn random_weights(seed: u64) -> Vec<LayerWeights> {
+        let mut rng = crate::rng::rng(seed, crate::rng::Stream::Weights, 0);
+        let layers = LAYERS.windows(2).map(|size| {
+            let limit = (6.0 / size[0] as f32).sqrt();
+            let mut draw = |n| (0..n).map(|_| rng.random_range(-limit..limit)).collect();
+            LayerWeights { weight: draw(size[0] * size[1]), bias: draw(size[1]) }
+        });
+        layers.collect()
+    }
+
+    fn reference(weights: &[LayerWeights], input: [f32; 6]) -> Vec<f32> {
+        let mut x = input.to_vec();
+        for (n, (layer, size)) in weights.iter().zip(LAYERS.windows(2)).enumerate() {
+            let row = |o: usize| &layer.weight[o * size[0]..(o + 1) * size[0]];
+            let y = (0..size[1]).map(|o| {
+                let dot: f64 =
+                    row(o).iter().zip(&x).map(|(w, x)| f64::from(*w) * f64::from(*x)).sum();
+                let sum = (dot + f64::from(layer.bias[o])) as f32;
+                if n + 2 < LAYERS.len() { sum.max(0.0) } else { sum }
+            });
+            x = y.collect();
+        }
+        x
+    }
+
+    #[test]
+    fn equals_the_textbook_sum_and_itself_without_avx2() {
+        let weights = random_weights(5);
+        let network = Network::new(&weights);
+        for i in 0..20 {
+            let input = std::array::from_fn(|j| ((i * 7 + j * 3) % 11) as f32 / 5.0 - 1.0);
+            let got = network.forward(input);
+            assert_eq!(got, network.forward_plain(input));
+            for (g, e) in got.iter().zip(reference(&weights, input)) {
+                assert!((g - e).abs() < 1e-4, "input {i}: {g} against {e}");
+            }
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! The loss curve as a picture.
+
+use plotters::prelude::*;
+
+use super::TrainingError;
+
+/// Losses of one epoch.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct EpochLoss {
+    /// Mean loss over the training rows, while they were learnt.
+    pub train: f32,
+    /// Mean loss over the validation rows, after the epoch.
+    pub validation: f32,
+}
+
+/// An SVG with training and validation loss over the epochs, loss logarithmic.
+pub fn svg(title: &str, losses: &[EpochLoss]) -> Result<String, TrainingError> {
+    let mut text = String::new();
+    draw(&mut text, title, losses).map_err(|e| TrainingError::Curve(e.to_string()))?;
+    Ok(text)
+}
+
+fn draw(
+    text: &mut String,
+    title: &str,
+    losses: &[EpochLoss],
+) -> Result<(), Box<dyn std::error::Error>> {
+    let values = losses.iter().flat_map(|l| [l.train, l.validation]);
+    let (low, high) = values.fold((f32::MAX, f32::MIN_POSITIVE), |(low, high), v| {
+        (low.min(v.max(f32::MIN_POSITIVE)), high.max(v))
+    });
+    let root = SVGBackend::with_string(text, (800, 500)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&root)
+        .caption(title, ("sans-serif", 20))
+        .margin(12)
+        .x_label_area_size(40)
+        .y_label_area_size(70)
+        .build_cartesian_2d(
+            1..losses.len().max(2),
+            (low.min(high) * 0.8..high * 1.25).log_scale(),
+        )?;
+    chart.configure_mesh().x_desc("epoch").y_desc("loss").draw()?;
+    let lines: [(&str, RGBColor, fn(&EpochLoss) -> f32); 2] =
+        [("training", BLUE, |l| l.train), ("validation", RED, |l| l.validation)];
+    for (name, colour, value) in lines {
+        let points = losses.iter().enumerate().map(|(i, l)| (i + 1, value(l)));
+        chart
+            .draw_series(LineSeries::new(points, colour.stroke_width(2)))?
+            .label(name)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 20, y)], colour));
+    }
+    chart.configure_series_labels().background_style(WHITE.mix(0.8)).border_style(BLACK).draw()?;
+    root.present()?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn draws_both_lines() {
+        let losses: Vec<_> = (1..=30)
+            .map(|i| EpochLoss { train: 1.0 / i as f32, validation: 1.2 / i as f32 })
+            .collect();
+        let text = svg("mlp parallel", &losses).unwrap();
+        assert!(text.starts_with("<svg") && text.contains("validation") && text.contains("epoch"));
+        assert!(svg("one epoch", &losses[..1]).is_ok());
+    }
+}

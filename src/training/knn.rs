@@ -1,0 +1,73 @@
+//! Samples → `knn.bin`.
+
+use std::path::Path;
+
+use super::{TrainingError, solved};
+use crate::dataset::{Metadata, Sample};
+use crate::geometry::Pose;
+use crate::selectors::artefact::write_atomic;
+use crate::selectors::knn_file::{self, KindHeader, KnnEntry, KnnHeader};
+use crate::world::ParkingType;
+
+/// What was stored.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KnnReport {
+    /// Solved samples and cells that have any, per parking type.
+    pub kinds: Vec<(ParkingType, usize, usize)>,
+    /// Size of the file, bytes.
+    pub bytes: usize,
+}
+
+/// Stores the solved samples of `kinds` in the file `out`.
+///
+/// A parking type without a solved sample is an error: a selector that knows nothing of it
+/// would be found out only on the road.
+pub fn train(
+    metadata: &Metadata,
+    samples: &[Sample],
+    data_sha256: &str,
+    kinds: &[ParkingType],
+    out: &Path,
+) -> Result<KnnReport, TrainingError> {
+    let mut headers = Vec::new();
+    let mut entries = Vec::new();
+    let mut report = Vec::new();
+    for &kind in kinds {
+        let cells = metadata.grid.cell_count(kind);
+        let solved = solved(samples, kind, cells)?;
+        if solved.is_empty() {
+            return Err(TrainingError::NoSamples(kind));
+        }
+        let occupied = solved.chunk_by(|a, b| a.cell_index == b.cell_index).count();
+        report.push((kind, solved.len(), occupied));
+        headers.push(KindHeader { kind, cells, samples: solved.len() });
+        let entry =
+            |s: &&Sample| KnnEntry { cell: s.cell_index, start: s.start, preparatory: s.rs_start };
+        entries.push(solved.iter().map(entry).collect::<Vec<_>>());
+    }
+    let header = KnnHeader {
+        vehicle: metadata.vehicle,
+        grid: metadata.grid,
+        heading_radius: metadata.vehicle.turning_radius() / 2.0,
+        extent: extent(&entries),
+        kinds: headers,
+        data_sha256: data_sha256.to_owned(),
+        seed: metadata.seed,
+        crate_version: env!("CARGO_PKG_VERSION").to_owned(),
+    };
+    let bytes = knn_file::encode(&header, &entries);
+    write_atomic(out, &bytes)?;
+    Ok(KnnReport { kinds: report, bytes: bytes.len() })
+}
+
+/// The least power of two, from 16 m, that no coordinate exceeds.
+fn extent(entries: &[Vec<KnnEntry>]) -> f64 {
+    let largest = |p: Pose| p.x.abs().max(p.y.abs());
+    let all = entries.iter().flatten();
+    let most = all.fold(0.0, |m: f64, e| m.max(largest(e.start)).max(largest(e.preparatory)));
+    let mut extent = 16.0;
+    while extent < most {
+        extent *= 2.0;
+    }
+    extent
+}

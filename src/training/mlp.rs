@@ -1,0 +1,366 @@
+//! Samples → one network of a parking type.
+//!
+//! The network learns `Features → (x, y, cos θ, sin θ)` of the preparatory pose from solved
+//! samples, both sides normalised. Whole cells are kept for validation, so that the loss
+//! measured is that of environments never seen. Whenever it improves the model file is
+//! replaced, so an interrupted training leaves the best network so far.
+//!
+//! The same samples, settings and seed give the same bytes: initial weights, order of rows
+//! and validation cells come from [`crate::rng`].
+
+use std::path::{Path, PathBuf};
+
+use candle_core::{DType, Device, Tensor, Var};
+use rand::RngExt;
+use rand::seq::SliceRandom;
+use serde::{Deserialize, Serialize};
+
+use super::curve::{self, EpochLoss};
+use super::optimiser::AdamW;
+use super::{Loss, MlpConfig, TrainingError, solved};
+use crate::cli;
+use crate::dataset::{Metadata, Sample};
+use crate::geometry::signed_angle;
+use crate::rng::{Stream, rng};
+use crate::selectors::artefact::write_atomic;
+use crate::selectors::mlp::{self, MlpHeader};
+use crate::selectors::network::{
+    LAYERS, LayerWeights, OUTPUTS, outputs_from_pose, pose_from_outputs,
+};
+use crate::selectors::{Features, Normaliser};
+use crate::world::ParkingType;
+
+/// Fewest solved samples worth training on.
+const LEAST_SAMPLES: usize = 10;
+
+/// How far predictions lie from the stored preparatory poses of the validation rows.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Errors {
+    /// Mean distance, metres.
+    pub position_mean_m: f64,
+    /// Median distance, metres.
+    pub position_median_m: f64,
+    /// 95th percentile of the distance, metres.
+    pub position_p95_m: f64,
+    /// Mean difference of the headings, radians.
+    pub heading_mean_rad: f64,
+    /// Median difference of the headings, radians.
+    pub heading_median_rad: f64,
+    /// 95th percentile of the difference of the headings, radians.
+    pub heading_p95_rad: f64,
+}
+
+/// The training's log, written as JSON beside the model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TrainingLog {
+    /// The parking type.
+    pub kind: ParkingType,
+    /// The settings.
+    pub config: MlpConfig,
+    /// SHA-256 of the data set.
+    pub data_sha256: String,
+    /// Training rows.
+    pub train_rows: usize,
+    /// Validation rows.
+    pub validation_rows: usize,
+    /// Losses epoch by epoch.
+    pub losses: Vec<EpochLoss>,
+    /// The epoch of the stored network, from 1.
+    pub best_epoch: usize,
+    /// Errors of the stored network on the validation rows.
+    pub validation: Errors,
+}
+
+/// Trains a network of `kind` and writes it to `out`, with `.training.json` and
+/// `.training.svg` in place of the extension beside it.
+pub fn train(
+    metadata: &Metadata,
+    samples: &[Sample],
+    data_sha256: &str,
+    kind: ParkingType,
+    config: &MlpConfig,
+    out: &Path,
+) -> Result<TrainingLog, TrainingError> {
+    config.validate()?;
+    let solved = solved(samples, kind, metadata.grid.cell_count(kind))?;
+    if solved.is_empty() {
+        return Err(TrainingError::NoSamples(kind));
+    }
+    if solved.len() < LEAST_SAMPLES {
+        let (samples, needed) = (solved.len(), LEAST_SAMPLES);
+        return Err(TrainingError::TooFew { kind, samples, needed });
+    }
+    let (train, validation) = split(&solved, config);
+    let raw_inputs: Vec<_> = train.iter().map(|s| features(s)).collect();
+    let raw_outputs: Vec<_> = train.iter().map(|s| outputs_from_pose(s.rs_start)).collect();
+    let header = MlpHeader {
+        format_version: mlp::VERSION,
+        kind,
+        vehicle: metadata.vehicle,
+        grid: metadata.grid,
+        features: Features::NAMES.map(str::to_owned).to_vec(),
+        layers: LAYERS.to_vec(),
+        input: Normaliser::fit(&raw_inputs),
+        output: Normaliser::fit(&raw_outputs),
+        data_sha256: data_sha256.to_owned(),
+        seed: config.seed,
+        training: serde_json::to_value(config).expect("settings are plain data"),
+        crate_version: env!("CARGO_PKG_VERSION").to_owned(),
+    };
+    let train = Rows::new(&train, &header);
+    let validation_rows = Rows::new(&validation, &header);
+    let model = Trainable::new(config.seed)?;
+    let mut optimiser = AdamW::new(&model.vars, config.weight_decay)?;
+
+    let mut log = TrainingLog {
+        kind,
+        config: config.clone(),
+        data_sha256: data_sha256.to_owned(),
+        train_rows: train.len(),
+        validation_rows: validation_rows.len(),
+        losses: Vec::new(),
+        best_epoch: 0,
+        validation: errors(&model, &validation, &validation_rows, &header)?,
+    };
+    let mut best = f32::INFINITY;
+    let mut order: Vec<usize> = (0..train.len()).collect();
+    let bar = cli::progress(config.epochs as u64, kind.name());
+    for epoch in 0..config.epochs {
+        order.shuffle(&mut rng(config.seed, Stream::Shuffle, epoch as u64));
+        let train_loss =
+            run_epoch(&model, &mut optimiser, &train, &order, config, config.rate(epoch))?;
+        let loss = EpochLoss {
+            train: train_loss,
+            validation: validation_loss(&model, &validation_rows, config)?,
+        };
+        if !(loss.train.is_finite() && loss.validation.is_finite()) {
+            return Err(TrainingError::Diverged { epoch: epoch + 1, loss: loss.train });
+        }
+        log.losses.push(loss);
+        if loss.validation < best {
+            best = loss.validation;
+            log.best_epoch = epoch + 1;
+            log.validation = errors(&model, &validation, &validation_rows, &header)?;
+            write_atomic(out, &mlp::encode(&header, &model.weights()?))?;
+            write_log(&log, out)?;
+        }
+        let median = log.validation.position_median_m;
+        bar.set_message(format!(
+            "loss {:.4} validation {:.4} best {best:.4} (epoch {}, median {median:.2} m)",
+            loss.train, loss.validation, log.best_epoch
+        ));
+        bar.inc(1);
+        if epoch + 1 >= log.best_epoch + config.patience {
+            break;
+        }
+    }
+    bar.finish_and_clear();
+    write_log(&log, out)?;
+    let picture = curve::svg(&format!("mlp, {kind}: loss"), &log.losses)?;
+    write_atomic(&out.with_extension("training.svg"), picture.as_bytes())?;
+    Ok(log)
+}
+
+/// The file of the training log of the model `out`.
+pub fn log_path(out: &Path) -> PathBuf {
+    out.with_extension("training.json")
+}
+
+fn write_log(log: &TrainingLog, out: &Path) -> Result<(), TrainingError> {
+    let mut text = serde_json::to_string_pretty(log).expect("a log is plain data");
+    text.push('\n');
+    Ok(write_atomic(&log_path(out), text.as_bytes())?)
+}
+
+fn features(sample: &Sample) -> [f32; Features::COUNT] {
+    Features::new(sample.start, sample.cell).values()
+}
+
+/// Training and validation samples: whole cells validate. Where there is one cell only,
+/// single samples of it do.
+fn split<'a>(solved: &[&'a Sample], config: &MlpConfig) -> (Vec<&'a Sample>, Vec<&'a Sample>) {
+    let mut cells: Vec<u32> = solved.iter().map(|s| s.cell_index).collect();
+    cells.dedup();
+    let of_cells = cells.len() > 1;
+    let mut units = if of_cells { cells } else { (0..solved.len() as u32).collect() };
+    units.shuffle(&mut rng(config.seed, Stream::Split, 0));
+    let kept = (units.len() as f64 * config.validation_share).ceil() as usize;
+    let mut kept = units[..kept].to_vec();
+    kept.sort_unstable();
+    let mut position = 0..;
+    solved.iter().partition(|s| {
+        let position = position.next().expect("an endless range");
+        kept.binary_search(if of_cells { &s.cell_index } else { &position }).is_err()
+    })
+}
+
+/// Normalised rows, ready to be gathered into batches.
+struct Rows {
+    inputs: Vec<[f32; Features::COUNT]>,
+    outputs: Vec<[f32; OUTPUTS]>,
+}
+
+impl Rows {
+    fn new(samples: &[&Sample], header: &MlpHeader) -> Self {
+        let inputs = samples.iter().map(|s| header.input.normalise(features(s)));
+        let outputs =
+            samples.iter().map(|s| header.output.normalise(outputs_from_pose(s.rs_start)));
+        Self { inputs: inputs.collect(), outputs: outputs.collect() }
+    }
+
+    fn len(&self) -> usize {
+        self.inputs.len()
+    }
+
+    /// `[rows, 6]` and `[rows, 4]`.
+    fn batch(&self, rows: &[usize]) -> candle_core::Result<(Tensor, Tensor)> {
+        let inputs: Vec<f32> = rows.iter().flat_map(|&i| self.inputs[i]).collect();
+        let outputs: Vec<f32> = rows.iter().flat_map(|&i| self.outputs[i]).collect();
+        Ok((
+            Tensor::from_vec(inputs, (rows.len(), Features::COUNT), &Device::Cpu)?,
+            Tensor::from_vec(outputs, (rows.len(), OUTPUTS), &Device::Cpu)?,
+        ))
+    }
+}
+
+/// The network as candle variables.
+struct Trainable {
+    /// Weight `[inputs, outputs]` and bias `[outputs]` of each layer in turn. Weights are
+    /// the transpose of the file's, so that neither pass has to transpose them.
+    vars: Vec<Var>,
+}
+
+impl Trainable {
+    /// He initialisation: uniform with variance 2 / inputs; biases zero.
+    fn new(seed: u64) -> candle_core::Result<Self> {
+        let mut vars = Vec::new();
+        for (layer, size) in LAYERS.windows(2).enumerate() {
+            let mut rng = rng(seed, Stream::Weights, layer as u64);
+            let limit = (6.0 / size[0] as f32).sqrt();
+            let weight: Vec<f32> =
+                (0..size[0] * size[1]).map(|_| rng.random_range(-limit..limit)).collect();
+            vars.push(Var::from_vec(weight, (size[0], size[1]), &Device::Cpu)?);
+            vars.push(Var::zeros(size[1], DType::F32, &Device::Cpu)?);
+        }
+        Ok(Self { vars })
+    }
+
+    /// `[batch, 6]` → `[batch, 4]`, both normalised.
+    fn forward(&self, inputs: &Tensor) -> candle_core::Result<Tensor> {
+        let last = self.vars.len() / 2 - 1;
+        let mut x = inputs.clone();
+        for (n, layer) in self.vars.chunks_exact(2).enumerate() {
+            x = x.matmul(&layer[0])?.broadcast_add(&layer[1])?;
+            if n < last {
+                x = x.relu()?;
+            }
+        }
+        Ok(x)
+    }
+
+    fn weights(&self) -> candle_core::Result<Vec<LayerWeights>> {
+        let layers = self.vars.chunks_exact(2).map(|layer| {
+            Ok(LayerWeights {
+                weight: layer[0].t()?.flatten_all()?.to_vec1()?,
+                bias: layer[1].to_vec1()?,
+            })
+        });
+        layers.collect()
+    }
+}
+
+/// Mean loss over all components of `[batch, 4]` predictions.
+fn loss(predicted: &Tensor, wanted: &Tensor, config: &MlpConfig) -> candle_core::Result<Tensor> {
+    let error = (predicted - wanted)?;
+    match config.loss {
+        Loss::Mse => error.sqr()?.mean_all(),
+        Loss::Huber => {
+            // c·(|e| − c/2) with c = min(|e|, δ), over δ so that far errors weigh one.
+            let size = error.abs()?;
+            let near = size.minimum(config.huber_delta)?;
+            ((&near * (size - (&near * 0.5)?)?)? * (1.0 / config.huber_delta))?.mean_all()
+        }
+    }
+}
+
+/// One pass over the training rows; their mean loss.
+fn run_epoch(
+    model: &Trainable,
+    optimiser: &mut AdamW,
+    rows: &Rows,
+    order: &[usize],
+    config: &MlpConfig,
+    rate: f64,
+) -> Result<f32, TrainingError> {
+    let mut total = 0.0;
+    for batch in order.chunks(config.batch) {
+        let (inputs, outputs) = rows.batch(batch)?;
+        let loss = loss(&model.forward(&inputs)?, &outputs, config)?;
+        optimiser.step(&loss.backward()?, rate)?;
+        total += loss.to_scalar::<f32>()? * batch.len() as f32;
+    }
+    Ok(total / order.len() as f32)
+}
+
+const EVALUATION_BATCH: usize = 2048;
+
+/// Predictions for all rows, `[rows, 4]` chunk by chunk, with the wanted outputs.
+fn evaluate(
+    model: &Trainable,
+    rows: &Rows,
+    mut each: impl FnMut(Tensor, Tensor) -> candle_core::Result<()>,
+) -> candle_core::Result<()> {
+    let all: Vec<usize> = (0..rows.len()).collect();
+    for batch in all.chunks(EVALUATION_BATCH) {
+        let (inputs, outputs) = rows.batch(batch)?;
+        // Detached variables: no graph is kept.
+        each(model.forward(&inputs)?.detach(), outputs)?;
+    }
+    Ok(())
+}
+
+fn validation_loss(
+    model: &Trainable,
+    rows: &Rows,
+    config: &MlpConfig,
+) -> Result<f32, TrainingError> {
+    let mut total = 0.0;
+    evaluate(model, rows, |predicted, wanted| {
+        let count = wanted.dim(0)? as f32;
+        total += loss(&predicted, &wanted, config)?.to_scalar::<f32>()? * count;
+        Ok(())
+    })?;
+    Ok(total / rows.len() as f32)
+}
+
+fn errors(
+    model: &Trainable,
+    samples: &[&Sample],
+    rows: &Rows,
+    header: &MlpHeader,
+) -> Result<Errors, TrainingError> {
+    let mut predicted = Vec::new();
+    evaluate(model, rows, |values, _| {
+        for row in values.to_vec2::<f32>()? {
+            let row = [row[0], row[1], row[2], row[3]];
+            predicted.push(pose_from_outputs(header.output.restore(row)));
+        }
+        Ok(())
+    })?;
+    let pairs = || predicted.iter().zip(samples);
+    let mut positions: Vec<f64> = pairs().map(|(p, s)| p.distance(s.rs_start)).collect();
+    let mut headings: Vec<f64> =
+        pairs().map(|(p, s)| signed_angle(p.heading, s.rs_start.heading).abs()).collect();
+    positions.sort_by(f64::total_cmp);
+    headings.sort_by(f64::total_cmp);
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    let quantile = |v: &[f64], q: f64| v[((v.len() - 1) as f64 * q).round() as usize];
+    Ok(Errors {
+        position_mean_m: mean(&positions),
+        position_median_m: quantile(&positions, 0.5),
+        position_p95_m: quantile(&positions, 0.95),
+        heading_mean_rad: mean(&headings),
+        heading_median_rad: quantile(&headings, 0.5),
+        heading_p95_rad: quantile(&headings, 0.95),
+    })
+}

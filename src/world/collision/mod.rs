@@ -1,0 +1,151 @@
+//! Exact collision of driven motions.
+//!
+//! A motion is checked whole, not sampled: nothing tunnels through, and one check per
+//! segment replaces hundreds of footprints. [`sweep`] has the geometry, [`index`] finds
+//! the obstacles near a motion; [`CollisionWorld`] puts both together for one vehicle.
+//! Touching counts as collision.
+
+mod bounds;
+mod index;
+mod sweep;
+
+use crate::curves::{Path, Segment};
+use crate::geometry::{Aabb, Polygon, Pose, Vec2, segment_in_box};
+use crate::vehicle::Vehicle;
+
+use super::Obstacles;
+use bounds::ConvexBounds;
+use index::EdgeIndex;
+pub use sweep::Sweep;
+
+/// Obstacles indexed for swept checks of one footprint.
+#[derive(Clone, Debug)]
+pub struct CollisionWorld {
+    index: EdgeIndex,
+    polygons: Vec<(Aabb, Polygon)>,
+    bounds: Option<ConvexBounds>,
+    footprint: Aabb,
+}
+
+impl CollisionWorld {
+    /// Indexes `obstacles` for `vehicle` grown by `margin` metres.
+    ///
+    /// `bounds`: corners of the convex region that the rear axle stays in,
+    /// counter-clockwise.
+    pub fn new(
+        obstacles: &Obstacles,
+        bounds: Option<[Vec2; 4]>,
+        vehicle: &Vehicle,
+        margin: f64,
+    ) -> Self {
+        Self {
+            index: EdgeIndex::new(obstacles),
+            polygons: obstacles.polygons.iter().map(|p| (p.aabb(), p.clone())).collect(),
+            bounds: bounds.map(ConvexBounds::new),
+            footprint: vehicle.footprint(margin),
+        }
+    }
+
+    /// The same obstacles with another margin, metres.
+    pub fn with_margin(self, vehicle: &Vehicle, margin: f64) -> Self {
+        Self { footprint: vehicle.footprint(margin), ..self }
+    }
+
+    /// The footprint (margin included) in the vehicle's frame.
+    pub fn footprint(&self) -> &Aabb {
+        &self.footprint
+    }
+
+    /// The box around the region the rear axle stays in; `None` without bounds.
+    pub fn bounds_aabb(&self) -> Option<Aabb> {
+        self.bounds.as_ref().map(ConvexBounds::aabb)
+    }
+
+    /// Whether the footprint at `pose` touches nothing and its axle is in bounds.
+    pub fn pose_is_free(&self, pose: Pose) -> bool {
+        if self.bounds.as_ref().is_some_and(|b| !b.contains(pose.position())) {
+            return false;
+        }
+        let body = BodyFrame::new(pose);
+        let near = body.aabb_of(&self.footprint);
+        let touches = self.index.any_near(&near, |a, b| {
+            segment_in_box(body.local(a), body.local(b), &self.footprint)
+        });
+        // No edge touches the footprint, so it lies wholly inside or outside each polygon.
+        let inside = |(aabb, p): &(Aabb, Polygon)| {
+            aabb.contains(pose.position()) && p.contains(pose.position())
+        };
+        !touches && !self.polygons.iter().any(inside)
+    }
+
+    /// Whether driving `segment` from the free pose `start` touches nothing.
+    ///
+    /// `start` must be free already (see [`CollisionWorld::pose_is_free`]): only contacts
+    /// made by moving are looked for.
+    pub fn segment_is_free(&self, start: Pose, segment: Segment) -> bool {
+        self.sweep_is_free(start, &Sweep::new(&self.footprint, segment))
+    }
+
+    /// [`CollisionWorld::segment_is_free`] with the sweep of this world's footprint
+    /// prepared beforehand, as the search does for its motion primitives.
+    pub fn sweep_is_free(&self, start: Pose, sweep: &Sweep) -> bool {
+        if self.bounds.as_ref().is_some_and(|b| !b.contains_motion(start, sweep.segment())) {
+            return false;
+        }
+        let body = BodyFrame::new(start);
+        let near = body.aabb_of(sweep.aabb());
+        !self.index.any_near(&near, |a, b| sweep.hits(body.local(a), body.local(b)))
+    }
+
+    /// Whether driving all `segments` from the free pose `start` touches nothing.
+    ///
+    /// The last segments are checked first: near the goal space is tightest.
+    pub fn segments_are_free(&self, start: Pose, segments: &[Segment]) -> bool {
+        let mut starts = [Pose::default(); 8];
+        assert!(segments.len() <= starts.len(), "at most 8 segments at once");
+        let mut pose = start;
+        for (slot, s) in starts.iter_mut().zip(segments) {
+            *slot = pose;
+            pose = s.end(pose);
+        }
+        let legs = starts.iter().zip(segments);
+        legs.rev().all(|(&from, &s)| self.segment_is_free(from, s))
+    }
+
+    /// Whether the whole path, its start included, touches nothing.
+    pub fn path_is_free(&self, path: &Path) -> bool {
+        self.pose_is_free(path.start) && path.legs().all(|(from, s)| self.segment_is_free(from, s))
+    }
+}
+
+/// A pose with its sine and cosine, to see obstacles from the vehicle.
+struct BodyFrame {
+    x: f64,
+    y: f64,
+    sin: f64,
+    cos: f64,
+}
+
+impl BodyFrame {
+    fn new(pose: Pose) -> Self {
+        let (sin, cos) = pose.sin_cos();
+        Self { x: pose.x, y: pose.y, sin, cos }
+    }
+
+    #[inline]
+    fn local(&self, p: Vec2) -> Vec2 {
+        let (dx, dy) = (p.x - self.x, p.y - self.y);
+        Vec2::new(self.cos * dx + self.sin * dy, self.cos * dy - self.sin * dx)
+    }
+
+    /// The smallest axis-aligned box of the parent frame around a box of the body frame.
+    fn aabb_of(&self, local: &Aabb) -> Aabb {
+        let center = (local.min + local.max) * 0.5;
+        let half = (local.max - local.min) * 0.5;
+        let (s, c) = (self.sin.abs(), self.cos.abs());
+        let (hx, hy) = (c * half.x + s * half.y, s * half.x + c * half.y);
+        let x = self.x + self.cos * center.x - self.sin * center.y;
+        let y = self.y + self.sin * center.x + self.cos * center.y;
+        Aabb::new(x - hx, y - hy, x + hx, y + hy)
+    }
+}

@@ -1,0 +1,405 @@
+//! Samples → artefacts → selectors, on synthetic samples.
+
+use std::path::{Path, PathBuf};
+
+use n3p::dataset::{Metadata, Sample, Status};
+use n3p::geometry::{Pose, signed_angle};
+use n3p::planners::HybridAStarConfig;
+use n3p::rng::{Stream, rng};
+use n3p::selectors::artefact::{Fault, Model, find_model};
+use n3p::selectors::knn::KnnSelector;
+use n3p::selectors::mlp::MlpSelector;
+use n3p::selectors::network::{LAYERS, pose_from_outputs};
+use n3p::selectors::{Features, PoseSelector};
+use n3p::training::{self, Loss, MlpConfig, TrainingError};
+use n3p::vehicle::Vehicle;
+use n3p::world::ParkingType;
+use n3p::world::cell::{Axis, Grid};
+use proptest::prelude::*;
+use rand::RngExt;
+
+const KIND: ParkingType = ParkingType::Parallel;
+
+/// 2 × 3 × 2 cells: small enough to fill, large enough to fall back in.
+fn metadata() -> Metadata {
+    let grid = Grid {
+        lane_width: Axis { min: 4.0, max: 5.0, step: 1.0 },
+        parallel_spot_width: Axis { min: 6.0, max: 7.0, step: 0.5 },
+        dead_end: Axis { min: 4.0, max: 12.0, step: 8.0 },
+        ..Grid::default()
+    };
+    Metadata {
+        format_version: 1,
+        vehicle: Vehicle::default(),
+        grid,
+        planner: HybridAStarConfig::default(),
+        max_expansions: 1000,
+        samples_per_cell: 50,
+        start_heading_max: 0.5,
+        seed: 7,
+        crate_version: "test".to_owned(),
+        git_revision: "test".to_owned(),
+    }
+}
+
+/// A preparatory pose that is a smooth function of start and cell.
+fn answer(start: Pose, grid: &Grid, kind: ParkingType, cell: usize) -> Pose {
+    let cell = grid.cell(kind, cell);
+    Pose::new(
+        2.0 + 0.3 * start.x.sin() + 0.2 * cell.spot_width,
+        2.5 + 0.4 * start.y - 0.1 * cell.lane_width,
+        0.5 * start.heading + 0.1 * (0.3 * start.x).cos(),
+    )
+}
+
+fn sample(kind: ParkingType, cell: usize, index: usize, start: Pose) -> Sample {
+    let grid = metadata().grid;
+    Sample {
+        cell: grid.cell(kind, cell),
+        cell_index: cell as u32,
+        sample_index: index as u32,
+        start,
+        status: Status::Solved,
+        rs_start: answer(start, &grid, kind, cell),
+        rs_word: "L+R-".to_owned(),
+        rs_lengths: [1.0, -1.0, 0.0, 0.0, 0.0],
+        entry: 0.0,
+        path_length: 10.0,
+        direction_changes: 1,
+        expansions: 10,
+        seed: 7,
+    }
+}
+
+/// `per_cell` samples in each of `cells`, with some failed ones between.
+fn samples(kind: ParkingType, cells: &[usize], per_cell: usize, seed: u64) -> Vec<Sample> {
+    let mut all = Vec::new();
+    for &cell in cells {
+        let mut rng = rng(seed, Stream::Start, cell as u64);
+        for i in 0..per_cell {
+            let mut draw = |low: f64, high: f64| rng.random_range(low..high);
+            let start = Pose::new(draw(-8.0, 8.0), draw(2.0, 5.0), draw(-0.5, 0.5));
+            all.push(sample(kind, cell, i, start));
+        }
+        let nan = Pose::new(f64::NAN, f64::NAN, f64::NAN);
+        let failed = sample(kind, cell, per_cell, Pose::default());
+        all.push(Sample { status: Status::NoPath, rs_start: nan, ..failed });
+    }
+    all
+}
+
+fn knn_of(samples: &[Sample], kinds: &[ParkingType], dir: &Path) -> KnnSelector {
+    let path = dir.join("knn.bin");
+    training::knn::train(&metadata(), samples, "abc", kinds, &path).unwrap();
+    KnnSelector::load(&path).unwrap()
+}
+
+fn features(start: Pose, cell: usize) -> Features {
+    Features::new(start, metadata().grid.cell(KIND, cell))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    /// Starts on a coarse lattice make ties common, doubled samples certain.
+    #[test]
+    fn knn_equals_a_linear_scan(
+        starts in prop::collection::vec((-8i32..8, 2i32..6, -1i32..2), 1..400),
+        queries in prop::collection::vec((-9.0f64..9.0, 1.0f64..6.0, -3.2f64..3.2), 8),
+        on_lattice in (-8i32..8, 2i32..6, -1i32..2),
+        n in 1usize..12,
+    ) {
+        let lattice = |(x, y, h): (i32, i32, i32)| {
+            Pose::new(f64::from(x), f64::from(y), f64::from(h) * 0.25)
+        };
+        let stored: Vec<_> =
+            starts.iter().enumerate().map(|(i, s)| sample(KIND, 0, i, lattice(*s))).collect();
+        let dir = tempfile::tempdir().unwrap();
+        let knn = knn_of(&stored, &[KIND], dir.path());
+        let radius = knn.file().header().heading_radius;
+        let mut queries: Vec<_> = queries.iter().map(|&(x, y, h)| Pose::new(x, y, h)).collect();
+        queries.push(lattice(on_lattice));
+        for query in queries {
+            let point = KnnSelector::point(query, radius);
+            let mut scan: Vec<_> = (0..stored.len())
+                .map(|i| (KnnSelector::point(knn.file().start(0, i), radius), i))
+                .map(|(p, i)| (KnnSelector::distance_sq(&p, &point), i))
+                .collect();
+            scan.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            scan.truncate(n);
+            let got: Vec<_> = knn.nearest(&features(query, 0), n)
+                .iter().map(|h| (h.distance_sq, h.sample)).collect();
+            prop_assert_eq!(got, scan, "query {:?}", query);
+        }
+    }
+}
+
+#[test]
+fn a_stored_start_returns_its_own_pose() {
+    let dir = tempfile::tempdir().unwrap();
+    let all = samples(KIND, &[0, 5, 11], 40, 3);
+    let knn = knn_of(&all, &[KIND], dir.path());
+    for s in all.iter().filter(|s| s.status == Status::Solved) {
+        let mut out = Vec::new();
+        knn.select(&Features::new(s.start, s.cell), 1, &mut out);
+        assert_eq!(out.len(), 1);
+        assert!(out[0].distance(s.rs_start) < 2e-6, "{:?} {:?}", out[0], s.rs_start);
+        assert!(signed_angle(out[0].heading, s.rs_start.heading).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn an_empty_cell_falls_back_to_the_nearest_smaller_one() {
+    // Index = (lane * 3 + spot) * 2 + dead end.
+    let index = |lane: usize, spot: usize, dead: usize| (lane * 3 + spot) * 2 + dead;
+    let dir = tempfile::tempdir().unwrap();
+    let stored = [index(0, 0, 0), index(0, 1, 1), index(1, 0, 1)];
+    let knn = knn_of(&samples(KIND, &stored, 3, 1), &[KIND], dir.path());
+    for (cell, expected) in [
+        (index(0, 0, 0), Some(index(0, 0, 0))),
+        (index(0, 0, 1), Some(index(0, 0, 0))),
+        // Both neighbours are one step away: the wider lane wins.
+        (index(1, 1, 1), Some(index(1, 0, 1))),
+        (index(0, 2, 1), Some(index(0, 1, 1))),
+        (index(0, 2, 0), Some(index(0, 0, 0))),
+        (index(1, 2, 0), Some(index(0, 0, 0))),
+    ] {
+        assert_eq!(knn.source_cell(0, cell), expected, "cell {cell}");
+        let near = knn.nearest(&features(Pose::new(0.0, 3.0, 0.0), cell), 1);
+        assert_eq!(near.first().map(|n| n.cell), expected);
+    }
+    let knn = knn_of(&samples(KIND, &[index(1, 1, 1)], 3, 1), &[KIND], dir.path());
+    let mut out = Vec::new();
+    knn.select(&features(Pose::new(0.0, 3.0, 0.0), index(1, 1, 0)), 3, &mut out);
+    assert!(out.is_empty(), "a larger cell must not answer");
+}
+
+#[test]
+fn several_poses_differ_and_keep_their_order() {
+    let dir = tempfile::tempdir().unwrap();
+    let knn = knn_of(&samples(KIND, &[4], 200, 3), &[KIND], dir.path());
+    let query = features(Pose::new(1.0, 3.0, 0.1), 4);
+    let (mut one, mut many) = (Vec::new(), vec![Pose::default()]);
+    knn.select(&query, 1, &mut one);
+    knn.select(&query, 5, &mut many);
+    assert_eq!(many[0], Pose::default(), "poses are appended");
+    assert_eq!(one[0], many[1]);
+    assert!(many.len() > 2 && many.len() <= 6, "{many:?}");
+    for (i, a) in many[1..].iter().enumerate() {
+        for b in &many[i + 2..] {
+            let same = a.distance(*b) <= KnnSelector::SAME_POSITION
+                && signed_angle(a.heading, b.heading).abs() <= KnnSelector::SAME_HEADING;
+            assert!(!same, "{a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn one_file_holds_all_types_and_the_same_input_gives_the_same_bytes() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut all: Vec<_> =
+        ParkingType::ALL.iter().flat_map(|k| samples(*k, &[0, 1], 20, 5)).collect();
+    let knn = knn_of(&all, &ParkingType::ALL, dir.path());
+    assert_eq!(knn.kinds(), ParkingType::ALL);
+    let bytes = std::fs::read(knn.path()).unwrap();
+    all.reverse();
+    knn_of(&all, &ParkingType::ALL, dir.path());
+    assert!(bytes == std::fs::read(knn.path()).unwrap(), "the order of rows must not matter");
+    let error = training::knn::train(
+        &metadata(),
+        &samples(KIND, &[0], 5, 1),
+        "abc",
+        &ParkingType::ALL,
+        &dir.path().join("other.bin"),
+    );
+    assert!(matches!(error, Err(TrainingError::NoSamples(ParkingType::Forward))));
+}
+
+fn quick(epochs: usize) -> MlpConfig {
+    MlpConfig { epochs, patience: epochs, batch: 64, seed: 11, ..MlpConfig::default() }
+}
+
+fn train_mlp(samples: &[Sample], config: &MlpConfig, path: &Path) -> training::mlp::TrainingLog {
+    training::mlp::train(&metadata(), samples, "abc", KIND, config, path).unwrap()
+}
+
+#[test]
+fn mlp_learns_a_smooth_mapping_reproducibly() {
+    let dir = tempfile::tempdir().unwrap();
+    let cells: Vec<usize> = (0..12).collect();
+    let all = samples(KIND, &cells, 60, 9);
+    for loss in [Loss::Mse, Loss::Huber] {
+        let config = MlpConfig { loss, ..quick(25) };
+        let path = dir.path().join("mlp-parallel.safetensors");
+        let log = train_mlp(&all, &config, &path);
+        let (first, last) = (log.losses[0].train, log.losses[log.losses.len() - 1].train);
+        assert!(last < first / 10.0, "{loss:?}: {first} → {last}");
+        assert!(log.validation.position_median_m < 0.3, "{:?}", log.validation);
+        assert!(log.validation_rows > 0 && log.best_epoch > 0);
+        let again = dir.path().join("again.safetensors");
+        train_mlp(&all, &config, &again);
+        assert!(std::fs::read(&path).unwrap() == std::fs::read(&again).unwrap(), "same bytes");
+        for extension in ["training.json", "training.svg"] {
+            assert!(path.with_extension(extension).exists());
+        }
+    }
+    let log = std::fs::read(training::mlp::log_path(&dir.path().join("again.safetensors")));
+    let log: training::mlp::TrainingLog = serde_json::from_slice(&log.unwrap()).unwrap();
+    assert_eq!(log.config.loss, Loss::Huber);
+}
+
+/// The network as candle computes it from the same file.
+fn candle_prediction(path: &Path, mlp: &MlpSelector, features: &Features) -> Pose {
+    use candle_core::{Device, Tensor};
+    use candle_nn::{Linear, Module};
+    let header = mlp.headers().next().unwrap();
+    let tensors = candle_core::safetensors::load(path, &Device::Cpu).unwrap();
+    let input = header.input.normalise(features.values());
+    let mut x = Tensor::from_slice(&input, (1, 6), &Device::Cpu).unwrap();
+    for n in 0..LAYERS.len() - 1 {
+        let get = |part: &str| tensors[&format!("layers.{n}.{part}")].clone();
+        x = Linear::new(get("weight"), Some(get("bias"))).forward(&x).unwrap();
+        if n + 2 < LAYERS.len() {
+            x = x.relu().unwrap();
+        }
+    }
+    let row = x.to_vec2::<f32>().unwrap();
+    pose_from_outputs(header.output.restore([row[0][0], row[0][1], row[0][2], row[0][3]]))
+}
+
+#[test]
+fn mlp_inference_equals_candle() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("mlp-parallel.safetensors");
+    let all = samples(KIND, &[0, 3, 7, 11], 60, 2);
+    train_mlp(&all, &quick(3), &path);
+    let mlp = MlpSelector::load(&path).unwrap();
+    for s in &all {
+        let features = Features::new(s.start, s.cell);
+        let (ours, candle) =
+            (mlp.predict(&features).unwrap(), candle_prediction(&path, &mlp, &features));
+        assert!(ours.distance(candle) < 1e-4, "{ours:?} {candle:?}");
+        assert!(signed_angle(ours.heading, candle.heading).abs() < 1e-4);
+    }
+    let elsewhere = metadata().grid.cell(ParkingType::Reverse, 0);
+    let mut out = Vec::new();
+    mlp.select(&Features::new(Pose::default(), elsewhere), 3, &mut out);
+    assert!(out.is_empty(), "a type without a network has no answer");
+}
+
+#[test]
+fn training_refuses_bad_rows_and_settings() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("m.safetensors");
+    let mut all = samples(KIND, &[0, 1], 20, 2);
+    let train = |samples: &[Sample], config: &MlpConfig| {
+        training::mlp::train(&metadata(), samples, "abc", KIND, config, &out).unwrap_err()
+    };
+    let config = MlpConfig { batch: 0, ..MlpConfig::default() };
+    assert!(train(&all, &config).to_string().starts_with("batch is 0"));
+    assert!(matches!(train(&all[..5], &quick(1)), TrainingError::TooFew { samples: 5, .. }));
+    assert!(matches!(train(&[], &quick(1)), TrainingError::NoSamples(KIND)));
+    all[3].rs_start.x = f64::NAN;
+    let error = train(&all, &quick(1)).to_string();
+    assert!(error.contains("sample 3 of parallel cell 0"), "{error}");
+    assert!(toml::from_str::<MlpConfig>("epoch = 3").unwrap_err().to_string().contains("epoch"));
+}
+
+/// A model of each kind, and the folder that holds them.
+fn both_models() -> (tempfile::TempDir, [PathBuf; 2]) {
+    let dir = tempfile::tempdir().unwrap();
+    let all = samples(KIND, &[0, 3], 30, 2);
+    let knn = knn_of(&all, &[KIND], dir.path()).path().to_owned();
+    let mlp = dir.path().join("mlp-parallel.safetensors");
+    train_mlp(&all, &quick(1), &mlp);
+    (dir, [knn, mlp])
+}
+
+fn fault(path: &Path, bytes: &[u8]) -> Fault {
+    std::fs::write(path, bytes).unwrap();
+    let error = Model::load(path).expect_err("a damaged model must be refused");
+    assert_eq!(error.path, path);
+    assert!(error.to_string().contains(&path.display().to_string()), "{error}");
+    error.fault
+}
+
+#[test]
+fn damaged_models_are_refused() {
+    let (dir, models) = both_models();
+    let bad = dir.path().join("bad");
+    for path in &models {
+        let good = std::fs::read(path).unwrap();
+        assert_eq!(Model::load(path).unwrap().kinds(), [KIND]);
+        assert!(matches!(fault(&bad, &[]), Fault::Empty));
+        assert!(matches!(fault(&bad, b"PK"), Fault::NotAModel));
+        assert!(matches!(
+            fault(&bad, &[b"hello world, ".as_slice(), &good].concat()),
+            Fault::NotAModel
+        ));
+        for length in [9, 40, 100, good.len() / 2, good.len() - 1] {
+            let fault = fault(&bad, &good[..length]);
+            let told = matches!(fault, Fault::Length { got, .. } if got == length as u64);
+            assert!(told, "{} cut to {length}: {fault}", path.display());
+        }
+        let longer = [good.as_slice(), &[0]].concat();
+        assert!(matches!(fault(&bad, &longer), Fault::Length { .. }));
+        // Any flipped bit is noticed; in the second half, which is data, as a checksum.
+        for i in 0..200 {
+            let at = i * (good.len() - 1) / 199;
+            let mut flipped = good.clone();
+            flipped[at] ^= 1 << (i % 8);
+            let fault = fault(&bad, &flipped);
+            assert!(at < good.len() / 2 || matches!(fault, Fault::Checksum), "byte {at}: {fault}");
+        }
+    }
+    let missing = Model::load(&dir.path().join("none.bin")).unwrap_err();
+    assert!(matches!(missing.fault, Fault::Missing));
+    assert!(matches!(Model::load(dir.path()).unwrap_err().fault, Fault::Unreadable(_)));
+}
+
+#[test]
+fn other_versions_and_shapes_are_named() {
+    let (dir, [knn, mlp]) = both_models();
+    let bad = dir.path().join("bad");
+    let mut bytes = std::fs::read(&knn).unwrap();
+    bytes[8] = 9;
+    let text = fault(&bad, &bytes).to_string();
+    assert!(text.contains("version 9") && text.contains("version 1"), "{text}");
+
+    let replace = |from: &str, to: &str| {
+        assert_eq!(from.len(), to.len());
+        let mut bytes = std::fs::read(&mlp).unwrap();
+        let at = bytes.windows(from.len()).position(|w| w == from.as_bytes()).expect(from);
+        bytes[at..at + to.len()].copy_from_slice(to.as_bytes());
+        fault(&bad, &bytes)
+    };
+    let text = replace(r#"\"format_version\":1"#, r#"\"format_version\":7"#).to_string();
+    assert!(text.contains("version 7") && text.contains("version 1"), "{text}");
+    let text = replace(r#""shape":[256,6]"#, r#""shape":[6,256]"#).to_string();
+    assert!(text.contains("expected F32 [256, 6], got F32 [6, 256]"), "{text}");
+    let text = replace("layers.2.bias", "layers.2.bios").to_string();
+    assert!(text.contains("layers.2.bias") && text.contains("got nothing"), "{text}");
+}
+
+#[test]
+fn models_of_another_vehicle_or_twice_the_same_are_refused() {
+    let (_dir, [knn, mlp]) = both_models();
+    let van = Vehicle { length: 5.5, ..Vehicle::default() };
+    for path in [&knn, &mlp] {
+        let model = Model::load(path).unwrap();
+        model.check_vehicle(&Vehicle::default()).unwrap();
+        let text = model.check_vehicle(&van).unwrap_err().to_string();
+        assert!(
+            text.contains("length is 4.97, wanted 5.5") && text.contains("n3p-train"),
+            "{text}"
+        );
+    }
+    let error = MlpSelector::load_all(&[&mlp, &mlp]).unwrap_err();
+    assert!(matches!(error.fault, Fault::Mismatch(_)), "{error}");
+}
+
+#[test]
+fn names_with_folders_are_taken_as_they_are() {
+    assert_eq!(find_model("some/knn.bin"), Path::new("some/knn.bin"));
+    assert_eq!(find_model("no-such-model.bin"), Path::new("no-such-model.bin"));
+}
