@@ -1,7 +1,31 @@
 //! Training data: Reeds-Shepp start poses of solved problems in abstracted environments.
 //!
-//! [`schema`] defines one row; collection, writing and reading follow it.
+//! A data set is a folder, `datasets/NAME/`:
+//!
+//! | file | holds |
+//! |---|---|
+//! | `metadata.json` | the settings every file shares; written first |
+//! | `TYPE-0003.parquet` | one shard: some consecutive cells of one parking type |
+//! | `TYPE-0003.json` | its checksum and counts, until the manifest takes them over |
+//! | `TYPE.manifest.json` | checksums and counts of all shards; written last |
+//!
+//! A type without manifest is incomplete. Poses are rear-axle poses in the spot frame.
+//!
+//! [`schema`] defines one row; [`config`] what is collected; [`sampler`] draws and solves one
+//! sample; [`collect`] runs the collection and [`write`] its files; [`manifest`] is the folder's
+//! bookkeeping; [`read`] gives the rows back; [`split`] picks the cells that validate.
 
+pub mod collect;
+pub mod config;
+pub mod manifest;
+pub mod read;
+pub mod sampler;
 pub mod schema;
+pub mod split;
+pub mod write;
 
+pub use collect::{CollectError, CollectOptions, Part, TypeReport, collect};
+pub use config::{CollectConfig, ConfigError};
+pub use read::{Dataset, DatasetError};
 pub use schema::{Metadata, Sample, Status};
+pub use split::validation_cells;

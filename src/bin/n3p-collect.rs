@@ -1,0 +1,77 @@
+//! `n3p-collect`: solves parking in abstracted environments and stores the samples.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Parser;
+use n3p::cli::{self, BadInput, OrBadInput};
+use n3p::dataset::{self, CollectConfig, CollectOptions, Part, TypeReport};
+use n3p::world::ParkingType;
+
+/// Collects training samples: Hybrid A* with Reeds-Shepp expansion in every cell of the grid.
+///
+/// May be interrupted at any moment; --resume then ends with the same bytes.
+#[derive(Parser)]
+#[command(version)]
+struct Args {
+    /// Parking type; all when omitted
+    #[arg(long = "type", value_name = "TYPE")]
+    kind: Option<ParkingType>,
+    /// Settings, a TOML file; the defaults when omitted
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Folder of the data set
+    #[arg(long, value_name = "DIR", default_value = "datasets/default")]
+    out: PathBuf,
+    /// Go on with what an earlier run left
+    #[arg(long)]
+    resume: bool,
+    /// Collect only every n-th file, from the i-th on, as one of n processes
+    #[arg(long, value_name = "I/N", default_value_t)]
+    shard: Part,
+    /// Worker threads; 0 for one per core
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: usize,
+}
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    cli::run(|| run(&args))
+}
+
+fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let config = match &args.config {
+        Some(path) => CollectConfig::read(path).or_bad_input()?,
+        None => CollectConfig::default(),
+    };
+    let kinds = args.kind.map_or(ParkingType::ALL.to_vec(), |kind| vec![kind]);
+    let options = CollectOptions { resume: args.resume, part: args.shard };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build()?;
+    let begin = Instant::now();
+    let bar = cli::progress(0, "collect");
+    let result = pool.install(|| dataset::collect(&config, &args.out, &kinds, options, &bar));
+    bar.finish_and_clear();
+    let reports = result.map_err(|e| {
+        if e.is_bad_input() { BadInput(e.to_string()).into() } else { anyhow::Error::from(e) }
+    })?;
+    let seconds = begin.elapsed().as_secs_f64();
+    for report in &reports {
+        println!("{}", summary(report));
+    }
+    println!("{}: {seconds:.1} s", args.out.display());
+    Ok(ExitCode::SUCCESS)
+}
+
+fn summary(report: &TypeReport) -> String {
+    let TypeReport { kind, rows, solved, bytes, collected_rows, missing_shards } = report;
+    let share = 100.0 * *solved as f64 / (*rows).max(1) as f64;
+    let size = *bytes as f64 / f64::from(1 << 20);
+    let missing = match missing_shards {
+        0 => String::new(),
+        n => format!("; {n} files are missing: collect the other parts, or --resume"),
+    };
+    format!(
+        "{kind}: {rows} rows ({collected_rows} new), {share:.2} % solved, {size:.2} MiB{missing}"
+    )
+}

@@ -1,0 +1,181 @@
+//! What is collected: the settings of `n3p-collect --config FILE.toml`.
+
+use std::f64::consts::PI;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::schema::{FORMAT_VERSION, GIT_REVISION, Metadata};
+use crate::planners::HybridAStarConfig;
+use crate::vehicle::Vehicle;
+use crate::world::ParkingType;
+use crate::world::cell::Grid;
+
+/// Settings of a collection. Every field may be left out of the file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CollectConfig {
+    /// The vehicle driven.
+    pub vehicle: Vehicle,
+    /// The grid of cells; each cell gets its samples.
+    pub grid: Grid,
+    /// The planner's settings.
+    pub planner: HybridAStarConfig,
+    /// Expansion budget per sample, 1 to 10⁹.
+    pub max_expansions: usize,
+    /// Samples per cell, 1 to 10⁶.
+    pub samples_per_cell: u32,
+    /// Start headings are uniform in ± this angle, radians, 0 to π.
+    pub start_heading_max: f64,
+    /// Consecutive cells per file; a file holds at most 2²⁰ rows.
+    pub cells_per_shard: u32,
+    /// Seed of the start poses.
+    pub seed: u64,
+}
+
+impl Default for CollectConfig {
+    fn default() -> Self {
+        Self {
+            vehicle: Vehicle::default(),
+            grid: Grid::default(),
+            planner: HybridAStarConfig::default(),
+            max_expansions: 50_000,
+            samples_per_cell: 100,
+            start_heading_max: PI / 3.0,
+            cells_per_shard: 16,
+            seed: 1,
+        }
+    }
+}
+
+/// Settings that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("{path}: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file is no TOML, or has an unknown or ill-typed key.
+    #[error("{path}, line {line} (`{text}`): {message}")]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// Line number, from 1.
+        line: usize,
+        /// What stands there.
+        text: String,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// A value is out of range; the message says field, value and range.
+    #[error("{0}")]
+    Value(String),
+}
+
+impl CollectConfig {
+    /// The most rows of one file: they are held in memory, and make one row group.
+    pub const MAX_SHARD_ROWS: u64 = 1 << 20;
+
+    /// Reads and checks a TOML file.
+    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| ConfigError::Read { path: path.to_owned(), source })?;
+        let config: Self = toml::from_str(&text).map_err(|e| {
+            let start = e.span().map_or(0, |span| span.start.min(text.len()));
+            let line = text.as_bytes()[..start].iter().filter(|b| **b == b'\n').count();
+            ConfigError::Parse {
+                path: path.to_owned(),
+                line: line + 1,
+                text: text.lines().nth(line).unwrap_or_default().trim().to_owned(),
+                message: e.message().to_owned(),
+            }
+        })?;
+        config.validate().map_err(|e| ConfigError::Value(format!("{}: {e}", path.display())))?;
+        Ok(config)
+    }
+
+    /// Checks every field.
+    pub fn validate(&self) -> Result<(), ConfigError> {
+        let bad = ConfigError::Value;
+        self.vehicle.validate().map_err(|e| bad(e.to_string()))?;
+        self.grid.validate().map_err(|e| bad(e.to_string()))?;
+        self.planner.validate().map_err(|e| bad(format!("planner.{e}")))?;
+        for (field, value, max) in [
+            ("max_expansions", self.max_expansions as u64, 1_000_000_000),
+            ("samples_per_cell", self.samples_per_cell.into(), 1_000_000),
+            ("cells_per_shard", self.cells_per_shard.into(), Self::MAX_SHARD_ROWS),
+        ] {
+            if !(1..=max).contains(&value) {
+                return Err(bad(format!("{field} is {value}; expected 1 to {max}")));
+            }
+        }
+        let rows = u64::from(self.samples_per_cell) * u64::from(self.cells_per_shard);
+        if rows > Self::MAX_SHARD_ROWS {
+            return Err(bad(format!(
+                "samples_per_cell · cells_per_shard is {rows}; expected at most {} rows in a file",
+                Self::MAX_SHARD_ROWS
+            )));
+        }
+        let heading = self.start_heading_max;
+        if !(0.0..=PI).contains(&heading) {
+            return Err(bad(format!("start_heading_max is {heading}; expected 0 to π radians")));
+        }
+        Ok(())
+    }
+
+    /// What files collected with these settings by this build say about themselves.
+    pub fn metadata(&self) -> Metadata {
+        Metadata {
+            format_version: FORMAT_VERSION,
+            vehicle: self.vehicle,
+            grid: self.grid,
+            planner: self.planner,
+            max_expansions: self.max_expansions,
+            samples_per_cell: self.samples_per_cell,
+            start_heading_max: self.start_heading_max,
+            cells_per_shard: self.cells_per_shard,
+            seed: self.seed,
+            crate_version: env!("CARGO_PKG_VERSION").to_owned(),
+            git_revision: GIT_REVISION.to_owned(),
+        }
+    }
+
+    /// Number of rows that a type gets.
+    pub fn rows(&self, kind: ParkingType) -> u64 {
+        self.grid.cell_count(kind) as u64 * u64::from(self.samples_per_cell)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error_of(text: &str) -> String {
+        let file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        CollectConfig::read(file.path()).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn the_defaults_are_valid() {
+        CollectConfig::default().validate().unwrap();
+    }
+
+    #[test]
+    fn errors_name_file_line_and_key() {
+        let e = error_of("seed = 3\nsamples = 5\n");
+        assert!(e.contains(".toml, line 2 (`samples = 5`): unknown field `samples`"), "{e}");
+        let e = error_of("seed = \"x\"");
+        assert!(e.contains("line 1 (`seed = \"x\"`)"), "{e}");
+        let e = error_of("max_expansions = 0");
+        assert!(e.contains("max_expansions is 0; expected 1 to 1000000000"), "{e}");
+        let e = error_of("start_heading_max = nan");
+        assert!(e.contains("start_heading_max is NaN"), "{e}");
+        let e = error_of("cells_per_shard = 100000");
+        assert!(e.contains("rows in a file"), "{e}");
+    }
+}

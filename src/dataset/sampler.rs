@@ -1,0 +1,176 @@
+//! One sample: a start pose drawn in a cell, solved by Hybrid A* with Reeds-Shepp expansion.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::config::CollectConfig;
+use super::schema::{Sample, Status, to_step};
+use crate::geometry::{Aabb, Pose, wrap_angle};
+use crate::planners::{Budget, HybridAStar, NoPath, PlanResult, Planner, Problem};
+use crate::rng::{Stream, rng};
+use crate::world::ParkingType;
+use crate::world::cell::Cell;
+
+/// Draws per sample before the cell counts as having no free start.
+const MAX_DRAWS: usize = 200;
+
+/// Solves samples one after the other; keeps the planner's buffers and the cell's problem.
+/// A sample depends on the settings and its own indices alone.
+pub struct Sampler<'a> {
+    config: &'a CollectConfig,
+    planner: HybridAStar,
+    current: Option<CellProblem>,
+}
+
+/// A cell, ready to be planned in.
+struct CellProblem {
+    cell: Cell,
+    index: u32,
+    /// `None` when the car does not fit the spot.
+    problem: Option<Problem>,
+}
+
+impl<'a> Sampler<'a> {
+    /// A sampler with `config`, which must be valid.
+    pub fn new(config: &'a CollectConfig) -> Self {
+        Self { config, planner: HybridAStar::new(config.planner), current: None }
+    }
+
+    /// The sample `sample_index` of the cell `cell_index`.
+    pub fn sample(&mut self, kind: ParkingType, cell_index: u32, sample_index: u32) -> Sample {
+        let config = self.config;
+        let known = self.current.take().filter(|c| c.index == cell_index && c.cell.kind == kind);
+        let here = self
+            .current
+            .insert(known.unwrap_or_else(|| CellProblem::new(config, kind, cell_index)));
+
+        let unsolved = |start, status| {
+            Sample::unsolved(here.cell, cell_index, sample_index, start, status, config.seed)
+        };
+        let nan = f64::NAN;
+        let no_start = unsolved(Pose::new(nan, nan, nan), Status::NoStart);
+        let Some(problem) = &mut here.problem else { return no_start };
+        let mut rng = rng(config.seed, Stream::Start, stream_index(kind, cell_index, sample_index));
+        let [lane, _] = config.grid.regions(&here.cell);
+        let Some(start) = (0..MAX_DRAWS)
+            .map(|_| draw(&mut rng, &lane, config.start_heading_max))
+            .find(|pose| problem.collision.pose_is_free(*pose))
+        else {
+            return no_start;
+        };
+
+        problem.start = start;
+        let budget = Budget { max_expansions: config.max_expansions };
+        let result = self.planner.plan(problem, budget);
+        fill(unsolved(start, Status::NoPath), &result, problem.goal).rounded()
+    }
+}
+
+impl CellProblem {
+    fn new(config: &CollectConfig, kind: ParkingType, index: u32) -> Self {
+        let cell = config.grid.cell(kind, index as usize);
+        // The goal stands in as start: with it, only a spot too narrow for the car fails.
+        let goal = config.grid.goal(kind, &config.vehicle);
+        let problem = Problem::in_cell(&config.grid, &cell, config.vehicle, goal).ok();
+        Self { cell, index, problem }
+    }
+}
+
+/// Different for every sample of a seed: an axis has at most 1001 values, so a cell index has
+/// 30 bits.
+fn stream_index(kind: ParkingType, cell_index: u32, sample_index: u32) -> u64 {
+    let kind: u64 = match kind {
+        ParkingType::Forward => 0,
+        ParkingType::Parallel => 1,
+        ParkingType::Reverse => 2,
+    };
+    kind << 62 | u64::from(cell_index) << 32 | u64::from(sample_index)
+}
+
+/// A pose uniform over `lane`, its heading uniform in ± `heading_max` radians.
+fn draw(rng: &mut ChaCha8Rng, lane: &Aabb, heading_max: f64) -> Pose {
+    let mut between = |min: f64, max: f64| min + (max - min) * rng.random::<f64>();
+    let x = between(lane.min.x, lane.max.x);
+    let y = between(lane.min.y, lane.max.y);
+    to_step(Pose::new(x, y, between(-heading_max, heading_max)))
+}
+
+/// `row` with what the planner found.
+fn fill(mut row: Sample, result: &PlanResult, goal: Pose) -> Sample {
+    row.expansions = u32::try_from(result.expansions).unwrap_or(u32::MAX);
+    let path = match &result.outcome {
+        Ok(path) => path,
+        Err(reason) => {
+            let spent = *reason == NoPath::BudgetSpent;
+            row.status = if spent { Status::BudgetSpent } else { Status::NoPath };
+            return row;
+        }
+    };
+    row.status = Status::Solved;
+    row.path_length = path.length();
+    row.direction_changes = path.direction_changes() as u32;
+    row.rs_start = goal;
+    row.rs_lengths = [0.0; 5];
+    row.entry = 0.0;
+    if let Some(tail) = &result.tail {
+        row.rs_start = Pose { heading: wrap_angle(tail.from.heading), ..tail.from };
+        row.rs_word = tail.word.name();
+        for (length, segment) in row.rs_lengths.iter_mut().zip(tail.word.segments()) {
+            *length = segment.length;
+        }
+        row.entry = tail.entry;
+    }
+    row
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::curves::{Path, Segment};
+
+    #[test]
+    fn stream_indices_never_meet() {
+        let mut all = Vec::new();
+        for kind in ParkingType::ALL {
+            for cell in [0, 1, 1001_u32.pow(3) - 1] {
+                all.extend([0, 1, u32::MAX].map(|sample| stream_index(kind, cell, sample)));
+            }
+        }
+        all.sort_unstable();
+        all.dedup();
+        assert_eq!(all.len(), 27);
+    }
+
+    #[test]
+    fn draws_stay_in_the_lane() {
+        let lane = Aabb::new(-10.0, 2.75, 4.0, 6.75);
+        let mut rng = rng(1, Stream::Start, 0);
+        for _ in 0..1000 {
+            let p = draw(&mut rng, &lane, 0.5);
+            assert!(lane.contains(p.position()) && p.heading.abs() <= 0.5, "{p:?}");
+        }
+    }
+
+    #[test]
+    fn failures_keep_their_reason_and_paths_their_length() {
+        let config = CollectConfig::default();
+        let cell = config.grid.cell(ParkingType::Reverse, 0);
+        let row = |result: PlanResult| {
+            let start = Pose::new(0.0, 4.0, 0.0);
+            let row = Sample::unsolved(cell, 0, 0, start, Status::NoPath, 1);
+            fill(row, &result, Pose::default()).rounded()
+        };
+        let spent = row(PlanResult::none(NoPath::BudgetSpent, 9));
+        assert_eq!((spent.status, spent.expansions), (Status::BudgetSpent, 9));
+        let enclosed = row(PlanResult::none(NoPath::Enclosed, 0));
+        assert_eq!(enclosed.status, Status::NoPath);
+        assert!(enclosed.path_length.is_nan() && !enclosed.rs_start.is_finite());
+
+        let segments = [2.5, -1.0].map(Segment::straight);
+        let path = Path::new(Pose::default(), segments);
+        let solved =
+            row(PlanResult { outcome: Ok(path), expansions: 4, tail: None, guidance: None });
+        assert_eq!((solved.path_length, solved.direction_changes), (3.5, 1));
+        assert_eq!(solved.rs_lengths, [0.0; 5]);
+    }
+}
