@@ -1,5 +1,7 @@
 //! Settings of the network's training.
 
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
 
 use super::TrainingError;
@@ -69,6 +71,19 @@ impl Default for MlpConfig {
 }
 
 impl MlpConfig {
+    /// Reads and checks a TOML file; absent settings keep their defaults.
+    pub fn read(path: &Path) -> Result<Self, TrainingError> {
+        let wrong = |problem| TrainingError::ConfigFile { path: path.to_owned(), problem };
+        let text = std::fs::read_to_string(path).map_err(|e| wrong(e.to_string()))?;
+        let config: Self = toml::from_str(&text).map_err(|e| {
+            let line = e.span().map(|span| 1 + text[..span.start].matches('\n').count());
+            let line = line.map(|n| format!("line {n}: ")).unwrap_or_default();
+            wrong(format!("{line}{}", e.message().replace('\n', " ")))
+        })?;
+        config.validate().map_err(|e| wrong(e.to_string()))?;
+        Ok(config)
+    }
+
     /// Checks every setting.
     pub fn validate(&self) -> Result<(), TrainingError> {
         let check = |field, ok: bool, value: String, expected| {
@@ -115,6 +130,24 @@ mod tests {
         let config = MlpConfig { learning_rate: f64::NAN, ..MlpConfig::default() };
         let error = config.validate().unwrap_err().to_string();
         assert!(error.starts_with("learning_rate is NaN; expected"), "{error}");
+    }
+
+    #[test]
+    fn a_bad_file_is_named_with_line_and_key() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("mlp.toml");
+        for (text, told) in [
+            ("epochs = 3\nepoch = 4", "mlp.toml: line 2: unknown field `epoch`"),
+            ("loss = \"l3\"", "unknown variant `l3`"),
+            ("batch = 0", "mlp.toml: batch is 0; expected"),
+            ("batch = ", "mlp.toml: line 1:"),
+        ] {
+            std::fs::write(&path, text).unwrap();
+            let error = MlpConfig::read(&path).unwrap_err().to_string();
+            assert!(error.contains(told) && !error.contains('\n'), "{error}");
+        }
+        std::fs::write(&path, "loss = \"mse\"").unwrap();
+        assert_eq!(MlpConfig::read(&path).unwrap().loss, Loss::Mse);
     }
 
     #[test]

@@ -44,6 +44,14 @@ pub enum TrainingError {
         /// What is wrong.
         problem: &'static str,
     },
+    /// A file of settings that cannot be used.
+    #[error("{}: {problem}", .path.display())]
+    ConfigFile {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What is wrong, with line and key where known.
+        problem: String,
+    },
     /// A setting outside its range.
     #[error("{field} is {value}; expected {expected}")]
     Config {
@@ -71,6 +79,25 @@ pub enum TrainingError {
     /// The picture of the loss.
     #[error("cannot draw the loss curve: {0}")]
     Curve(String),
+}
+
+impl TrainingError {
+    /// Whether other data or settings would help, as against our bug or the disk.
+    pub fn is_bad_input(&self) -> bool {
+        !matches!(self, Self::Artefact(_) | Self::Candle(_) | Self::Curve(_))
+    }
+}
+
+/// Keeps candle to one thread unless `RAYON_NUM_THREADS` says otherwise: its pool waits
+/// actively, and at this network's size more threads are slower.
+///
+/// To be called first thing in `main`, before any thread is started.
+pub fn single_threaded() {
+    const THREADS: &str = "RAYON_NUM_THREADS";
+    if std::env::var_os(THREADS).is_none() {
+        // SAFETY: the documented contract, no other thread is running yet.
+        unsafe { std::env::set_var(THREADS, "1") };
+    }
 }
 
 /// The solved samples of a type, by cell and then by index, whatever the order of `samples`.

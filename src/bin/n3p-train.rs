@@ -1,0 +1,147 @@
+//! `n3p-train`: trains selectors from a data set.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+use n3p::cli::{self, BadInput, OrBadInput};
+use n3p::dataset::Dataset;
+use n3p::selectors::artefact;
+use n3p::training::{self, MlpConfig, TrainingError};
+use n3p::world::ParkingType;
+
+/// Trains a selector from a data set and writes it as one model file.
+#[derive(Parser)]
+#[command(version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Trains the network of one parking type, or of every type of the data set
+    ///
+    /// May be interrupted at any moment: the best network so far is in its file. A training
+    /// log and the loss curve are written beside it.
+    Mlp(MlpArgs),
+    /// Stores the solved samples of one or all types for nearest-neighbour queries
+    Knn(KnnArgs),
+}
+
+#[derive(Args)]
+struct Common {
+    /// Parking type; all of the data set when omitted
+    #[arg(long = "type", value_name = "TYPE")]
+    kind: Option<ParkingType>,
+    /// Folder of the data set
+    #[arg(long, value_name = "DIR", default_value = "datasets/small")]
+    data: PathBuf,
+}
+
+#[derive(Args)]
+struct MlpArgs {
+    #[command(flatten)]
+    common: Common,
+    /// Model file [default: models/mlp-TYPE.safetensors]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Settings of the training, a TOML file; the defaults when omitted
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Seed of weights, shuffling and validation cells; overrides the settings
+    #[arg(long, value_name = "S")]
+    seed: Option<u64>,
+}
+
+#[derive(Args)]
+struct KnnArgs {
+    #[command(flatten)]
+    common: Common,
+    /// Model file
+    #[arg(long, value_name = "FILE", default_value = "models/knn.bin")]
+    out: PathBuf,
+}
+
+fn main() -> ExitCode {
+    training::single_threaded();
+    let cli = Cli::parse();
+    cli::run(|| match &cli.command {
+        Command::Mlp(args) => mlp(args),
+        Command::Knn(args) => knn(args),
+    })
+}
+
+fn mlp(args: &MlpArgs) -> anyhow::Result<ExitCode> {
+    let mut config = match &args.config {
+        Some(path) => MlpConfig::read(path).or_bad_input()?,
+        None => MlpConfig::default(),
+    };
+    config.seed = args.seed.unwrap_or(config.seed);
+    config.validate().or_bad_input()?;
+    if args.out.is_some() && args.common.kind.is_none() {
+        let text = "--out names one file, but every type gets its own: give --type, too";
+        return Err(BadInput(text.to_owned()).into());
+    }
+    let out = |kind: ParkingType| {
+        let default = || PathBuf::from(format!("models/mlp-{kind}.safetensors"));
+        args.out.clone().unwrap_or_else(default)
+    };
+    let possible = args.common.kind.map_or(ParkingType::ALL.to_vec(), |kind| vec![kind]);
+    for kind in possible {
+        artefact::check_writable(&out(kind)).or_bad_input()?;
+    }
+    let (data, kinds) = read(&args.common)?;
+    for kind in kinds {
+        let out = out(kind);
+        let (metadata, samples) = (&data.metadata, &data.samples);
+        let log = training::mlp::train(metadata, samples, &data.sha256, kind, &config, &out)
+            .map_err(|e| exit_code(e, &args.common.data))?;
+        println!(
+            "{}: {} rows, best of {} epochs is {}; on {} unseen rows the median error is {:.2} m, \
+             {:.1}°",
+            out.display(),
+            log.train_rows,
+            log.losses.len(),
+            log.best_epoch,
+            log.validation_rows,
+            log.validation.position_median_m,
+            log.validation.heading_median_rad.to_degrees(),
+        );
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
+    artefact::check_writable(&args.out).or_bad_input()?;
+    let (data, kinds) = read(&args.common)?;
+    let report =
+        training::knn::train(&data.metadata, &data.samples, &data.sha256, &kinds, &args.out)
+            .map_err(|e| exit_code(e, &args.common.data))?;
+    for (kind, samples, cells) in &report.kinds {
+        println!("{kind}: {samples} samples in {cells} cells");
+    }
+    let size = report.bytes as f64 / f64::from(1 << 20);
+    println!("{}: {size:.2} MiB", args.out.display());
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The data set, and the parking types to train: the one asked for or all it holds.
+fn read(args: &Common) -> anyhow::Result<(Dataset, Vec<ParkingType>)> {
+    let data = Dataset::read(&args.data, args.kind).or_bad_input()?;
+    let held = |kind: &ParkingType| data.samples.iter().any(|s| s.cell.kind == *kind);
+    let kinds = match args.kind {
+        Some(kind) => vec![kind],
+        None => ParkingType::ALL.into_iter().filter(held).collect(),
+    };
+    Ok((data, kinds))
+}
+
+/// Keeps apart what the user can mend and what not.
+fn exit_code(error: TrainingError, data: &Path) -> anyhow::Error {
+    if error.is_bad_input() {
+        BadInput(format!("{}: {error}", data.display())).into()
+    } else {
+        error.into()
+    }
+}
