@@ -20,7 +20,7 @@ struct Args {
     /// working folder, then in models/.
     #[arg(long = "model", value_name = "FILE")]
     models: Vec<String>,
-    /// Parking type [default: all].
+    /// Parking type [default: all that the models know].
     #[arg(long = "type", value_enum, value_name = "TYPE")]
     kind: Option<ParkingType>,
     /// Difficulty of the generated scenes [default: all].
@@ -71,15 +71,15 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
         threads: args.threads.into(),
     };
     config.build_all(&models).or_bad_input()?;
-    let (cases, scenes) = cases(args, &models)?;
+    let (cases, scenes) = cases(args, &config.methods, &models)?;
     suite::check(&cases, &models, &config).or_bad_input()?;
     let mut outputs = Outputs::create(args.out.as_deref(), args.paths.as_deref()).or_bad_input()?;
 
     let bar = cli::progress((cases.len() * config.methods.len()) as u64, "evaluate");
-    let rows = suite::run(&cases, &models, &config, 0, |episode| {
+    let rows = suite::run(&cases, &models, &config, 0, |case, episode| {
         bar.set_message(format!("{} {}", episode.row.method, episode.row.scene));
         bar.inc(1);
-        outputs.take(episode).map_err(anyhow::Error::from)
+        outputs.take(case, episode).map_err(anyhow::Error::from)
     })?;
     bar.finish_and_clear();
 
@@ -96,16 +96,22 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
 }
 
 /// The scenes, and what to call them in the report.
-fn cases(args: &Args, models: &Models) -> Result<(Vec<Case>, String)> {
+fn cases(args: &Args, methods: &[Method], models: &Models) -> Result<(Vec<Case>, String)> {
     if let Some(dir) = &args.scenes {
         let cases = suite::from_folder(dir, args.kind).or_bad_input()?;
         let title = format!("{} from {}", cases.len(), dir.display());
         return Ok((cases, title));
     }
-    let kinds = args.kind.map_or(ParkingType::ALL.to_vec(), |k| vec![k]);
+    // Without --type: all that the models of the chosen methods know.
+    let known = |k: &ParkingType| methods.iter().all(|m| models.check_kind(*m, *k).is_ok());
+    let kinds = match args.kind {
+        Some(kind) => vec![kind],
+        None => ParkingType::ALL.into_iter().filter(known).collect(),
+    };
     let levels = args.level.map_or(Level::ALL.to_vec(), |l| vec![l]);
     let vehicle = models.vehicle().unwrap_or_default();
-    let cases = suite::generated(&vehicle, &kinds, &levels, args.count as usize, args.seed);
+    let cases = suite::generated(&vehicle, &kinds, &levels, args.count as usize, args.seed)
+        .or_bad_input()?;
     let title = format!(
         "{} generated, {} of each type and level, seed {}",
         cases.len(),

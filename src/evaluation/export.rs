@@ -10,6 +10,7 @@ use std::path::{Path as FilePath, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::curves::Path;
+use crate::dataset::write::write_atomically;
 use crate::geometry::{Frame, Pose, signed_angle};
 use crate::world::Scene;
 
@@ -73,8 +74,8 @@ impl PathFile {
     }
 
     /// `SCENE.METHOD.json`.
-    pub fn file_name(scene: &str, method: &str) -> String {
-        format!("{scene}.{method}.json")
+    pub fn file_name(scene: &Scene, method: &str) -> String {
+        format!("{}.{method}.json", scene.file_stem())
     }
 
     /// Reads a path file and checks that its arrays fit together.
@@ -97,7 +98,7 @@ impl PathFile {
     /// Writes the file (to a temporary name, then renamed).
     pub fn write(&self, file: &FilePath) -> Result<(), PathFileError> {
         let json = serde_json::to_vec(self).expect("plain numbers and strings");
-        super::rows::write_atomically(file, &json)
+        write_atomically(file, &json)
             .map_err(|error| PathFileError::Io { path: file.to_owned(), error })
     }
 }
@@ -143,7 +144,7 @@ mod tests {
         assert!(file.steer[0] < 0.0, "a mirrored left turn is a right turn");
         assert_eq!((file.gears[0], file.gears[100]), (1, -1));
         let dir = tempfile::tempdir().unwrap();
-        let name = dir.path().join(PathFile::file_name("s", "ha-rs"));
+        let name = dir.path().join(PathFile::file_name(&scene, "ha-rs"));
         file.write(&name).unwrap();
         assert_eq!(PathFile::read(&name).unwrap(), file);
     }

@@ -129,21 +129,19 @@ impl Method {
         config: &HybridAStarConfig,
     ) -> Result<Box<dyn Planner + Send>, MethodError> {
         let no_model = |model, example| MethodError::NoModel { method: self, model, example };
+        let selector = models.selector(self);
         match self {
             Self::HaRs => Ok(Box::new(HybridAStar::new(*config))),
             Self::KnnN3p => {
-                let selector = models.knn().ok_or_else(|| no_model("knn", "knn.bin"))?;
+                let selector = selector.ok_or_else(|| no_model("knn", "knn.bin"))?;
                 Ok(Box::new(GuidedPlanner::paper(self.name(), selector, *config)))
             }
             Self::MlpN3p => {
-                let selector = models.mlp().ok_or_else(|| no_model("mlp", "mlp-parallel.bin"))?;
+                let selector = selector.ok_or_else(|| no_model("mlp", "mlp-TYPE.safetensors"))?;
                 Ok(Box::new(GuidedPlanner::paper(self.name(), selector, *config)))
             }
             Self::N3p => {
-                let selector = models
-                    .knn()
-                    .or_else(|| models.mlp())
-                    .ok_or_else(|| no_model("knn", "knn.bin"))?;
+                let selector = selector.ok_or_else(|| no_model("knn", "knn.bin"))?;
                 Ok(Box::new(GuidedPlanner::ranked(self.name(), selector, *config)))
             }
             Self::Ha | Self::HaHold | Self::Mhha | Self::Sha | Self::RlSimple | Self::RlEval => {

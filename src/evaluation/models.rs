@@ -1,229 +1,165 @@
 //! The trained models of one run, whichever files they come from.
 
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::geometry::Pose;
-use crate::selectors::{Features, PoseSelector};
+use super::method::Method;
+use crate::selectors::PoseSelector;
+use crate::selectors::artefact::{self, ArtefactError, Model, find_model};
+use crate::selectors::mlp::MlpSelector;
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
-use crate::world::cell::Grid;
 
-/// Models by family. Files may hold one parking type each; the first one given for a
-/// type is used.
+/// At most one KNN and one MLP selector, all trained for one vehicle.
 #[derive(Clone, Default)]
 pub struct Models {
-    knn: Vec<Arc<dyn PoseSelector>>,
-    mlp: Vec<Arc<dyn PoseSelector>>,
-    vehicle: Option<Vehicle>,
+    knn: Option<Arc<dyn PoseSelector>>,
+    mlp: Option<Arc<dyn PoseSelector>>,
+    origin: Option<Origin>,
+}
+
+/// Where the first model comes from, and whom it was trained for.
+#[derive(Clone, Debug)]
+struct Origin {
+    path: PathBuf,
+    family: &'static str,
+    kinds: Vec<ParkingType>,
+    vehicle: Vehicle,
 }
 
 /// Models that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelsError {
-    /// A file cannot be loaded.
-    #[error("--model {name}: {message}")]
-    Load {
-        /// As given.
-        name: String,
-        /// Why, and what would be right.
-        message: String,
-    },
-    /// Two files were trained for different vehicles or grids.
-    #[error(
-        "--model {name}: trained for another {what} than the models before it; evaluate them in separate runs"
-    )]
-    Mixed {
-        /// As given.
-        name: String,
-        /// `vehicle` or `grid of cells`.
-        what: &'static str,
-    },
+    /// A file cannot be loaded, or was trained for another vehicle than those before it.
+    #[error("--model: {0}")]
+    Load(#[from] ArtefactError),
+    /// Two KNN files were given.
+    #[error("--model {0}: a KNN model was given before; one file holds all types: give one")]
+    TwoKnn(PathBuf),
     /// The scene's vehicle is not the one trained for.
-    #[error(
-        "{scene}: vehicle: the models were trained for another vehicle ({trained}), the scene has \
-         {found}; collect and train for this vehicle, or use --methods ha-rs"
-    )]
+    #[error("scene {scene}: vehicle: {error}; or plan with --methods ha-rs")]
     Vehicle {
         /// Name of the scene.
         scene: String,
-        /// Dimensions of the models' vehicle.
-        trained: String,
-        /// Dimensions of the scene's vehicle.
-        found: String,
+        /// Which field differs, and how to train for it.
+        error: ArtefactError,
     },
-}
-
-/// The two families of selectors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Family {
-    Knn,
-    Mlp,
-}
-
-/// What one artefact holds.
-struct Loaded {
-    family: Family,
-    selector: Arc<dyn PoseSelector>,
-    vehicle: Vehicle,
+    /// A method's model knows nothing of a parking type.
+    #[error(
+        "method {method}: no model for type {kind}: give one more with --model, or choose a \
+         --type that its models know ({known})"
+    )]
+    Kind {
+        /// The method.
+        method: Method,
+        /// The parking type it was asked to plan.
+        kind: ParkingType,
+        /// The types it knows.
+        known: String,
+    },
 }
 
 impl Models {
     /// Loads every file of `names`; bare names are looked for in the working folder,
-    /// then in `models/`.
-    pub fn load(names: &[String]) -> Result<Self, ModelsError> {
+    /// then in `models/`. Networks of several parking types join into one selector.
+    pub fn load<P: AsRef<Path>>(names: &[P]) -> Result<Self, ModelsError> {
         let mut models = Self::default();
+        let mut networks: Option<MlpSelector> = None;
         for name in names {
-            let loaded = load_one(name)
-                .map_err(|message| ModelsError::Load { name: name.clone(), message })?;
-            models.add(name, loaded)?;
+            let model = Model::load(&find_model(name))?;
+            match &models.origin {
+                Some(first) => model.check_vehicle(&first.vehicle)?,
+                None => models.origin = Some(Origin::of(&model)),
+            }
+            match model {
+                Model::Knn(knn) if models.knn.is_some() => {
+                    return Err(ModelsError::TwoKnn(knn.path().to_owned()));
+                }
+                Model::Knn(knn) => models.knn = Some(Arc::new(knn)),
+                Model::Mlp(mlp) => {
+                    networks = Some(match networks {
+                        Some(others) => others.combine(mlp)?,
+                        None => mlp,
+                    });
+                }
+            }
         }
+        models.mlp = networks.map(|n| Arc::new(n) as Arc<dyn PoseSelector>);
         Ok(models)
     }
 
-    fn add(&mut self, name: &str, loaded: Loaded) -> Result<(), ModelsError> {
-        let mixed = |what| Err(ModelsError::Mixed { name: name.to_owned(), what });
-        if self.vehicle.is_some_and(|v| !same_body(&v, &loaded.vehicle)) {
-            return mixed("vehicle");
-        }
-        let family = match loaded.family {
-            Family::Knn => &mut self.knn,
-            Family::Mlp => &mut self.mlp,
+    /// Loads what `method` needs from the usual files (`knn.bin`, `mlp-TYPE.safetensors`),
+    /// as far as they exist.
+    pub fn usual(method: Method) -> Result<Self, ModelsError> {
+        let names: Vec<String> = match method {
+            Method::KnnN3p | Method::N3p => vec!["knn.bin".to_owned()],
+            Method::MlpN3p => {
+                ParkingType::ALL.iter().map(|k| format!("mlp-{k}.safetensors")).collect()
+            }
+            _ => Vec::new(),
         };
-        if family.first().is_some_and(|s| s.grid() != loaded.selector.grid()) {
-            return mixed("grid of cells");
-        }
-        self.vehicle = Some(loaded.vehicle);
-        family.push(loaded.selector);
-        Ok(())
+        let found: Vec<PathBuf> =
+            names.iter().map(find_model).filter(|path| path.exists()).collect();
+        Self::load(&found)
     }
 
     /// The KNN selector, if any.
     pub fn knn(&self) -> Option<Arc<dyn PoseSelector>> {
-        by_type(&self.knn)
+        self.knn.clone()
     }
 
     /// The MLP selector, if any.
     pub fn mlp(&self) -> Option<Arc<dyn PoseSelector>> {
-        by_type(&self.mlp)
+        self.mlp.clone()
+    }
+
+    /// The selector that `method` plans with; `None` where it needs none or has none.
+    pub fn selector(&self, method: Method) -> Option<Arc<dyn PoseSelector>> {
+        match method {
+            Method::KnnN3p => self.knn(),
+            Method::MlpN3p => self.mlp(),
+            Method::N3p => self.knn().or_else(|| self.mlp()),
+            _ => None,
+        }
     }
 
     /// The vehicle that the models were trained for; `None` without models.
     pub fn vehicle(&self) -> Option<Vehicle> {
-        self.vehicle
+        self.origin.as_ref().map(|o| o.vehicle)
     }
 
     /// Refuses a scene with another vehicle than the models'.
     pub fn check_vehicle(&self, scene: &str, vehicle: &Vehicle) -> Result<(), ModelsError> {
-        match self.vehicle {
-            Some(trained) if !same_body(&trained, vehicle) => Err(ModelsError::Vehicle {
-                scene: scene.to_owned(),
-                trained: dimensions(&trained),
-                found: dimensions(vehicle),
-            }),
-            _ => Ok(()),
+        let Some(Origin { path, family, kinds, vehicle: trained }) = &self.origin else {
+            return Ok(());
+        };
+        artefact::check_vehicle(path, family, kinds, trained, vehicle)
+            .map_err(|error| ModelsError::Vehicle { scene: scene.to_owned(), error })
+    }
+
+    /// Refuses a parking type that `method`'s model was not trained for.
+    pub fn check_kind(&self, method: Method, kind: ParkingType) -> Result<(), ModelsError> {
+        let Some(selector) = self.selector(method) else { return Ok(()) };
+        let kinds = selector.kinds();
+        if kinds.contains(&kind) {
+            return Ok(());
         }
+        let known = kinds.iter().map(|k| k.name()).collect::<Vec<_>>().join(", ");
+        Err(ModelsError::Kind { method, kind, known })
     }
 }
 
-/// Whether two vehicles plan alike: speeds only matter for times.
-fn same_body(a: &Vehicle, b: &Vehicle) -> bool {
-    Vehicle { forward_speed: b.forward_speed, backward_speed: b.backward_speed, ..*a } == *b
-}
-
-fn dimensions(v: &Vehicle) -> String {
-    format!(
-        "{} × {} m, wheelbase {} m, rear overhang {} m, max_steer {:.4} rad",
-        v.length, v.width, v.wheelbase, v.rear_overhang, v.max_steer
-    )
-}
-
-/// Finds, reads and checks one artefact.
-fn load_one(name: &str) -> Result<Loaded, String> {
-    unimplemented!("selectors::artefact: find_model and Model::load for {name}")
-}
-
-/// One selector over files of different parking types.
-struct ByType {
-    parts: Vec<Arc<dyn PoseSelector>>,
-}
-
-fn by_type(parts: &[Arc<dyn PoseSelector>]) -> Option<Arc<dyn PoseSelector>> {
-    match parts {
-        [] => None,
-        [one] => Some(one.clone()),
-        parts => Some(Arc::new(ByType { parts: parts.to_vec() })),
-    }
-}
-
-impl PoseSelector for ByType {
-    fn select(&self, features: &Features, k: usize, out: &mut Vec<Pose>) {
-        if let Some(part) = self.parts.iter().find(|p| p.kinds().contains(&features.cell.kind)) {
-            part.select(features, k, out);
+impl Origin {
+    fn of(model: &Model) -> Self {
+        let family = match model {
+            Model::Knn(_) => "knn",
+            Model::Mlp(_) => "mlp",
+        };
+        Self {
+            path: model.path().to_owned(),
+            family,
+            kinds: model.kinds(),
+            vehicle: *model.vehicle(),
         }
-    }
-
-    fn grid(&self) -> &Grid {
-        self.parts[0].grid()
-    }
-
-    fn kinds(&self) -> Vec<ParkingType> {
-        let mut kinds: Vec<_> = self.parts.iter().flat_map(|p| p.kinds()).collect();
-        kinds.sort();
-        kinds.dedup();
-        kinds
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::world::cell::Cell;
-
-    struct Fixed(ParkingType, Grid);
-
-    impl PoseSelector for Fixed {
-        fn select(&self, _: &Features, _: usize, out: &mut Vec<Pose>) {
-            out.push(Pose::new(f64::from(self.0 as u8), 0.0, 0.0));
-        }
-        fn grid(&self) -> &Grid {
-            &self.1
-        }
-        fn kinds(&self) -> Vec<ParkingType> {
-            vec![self.0]
-        }
-    }
-
-    fn loaded(kind: ParkingType, vehicle: Vehicle) -> Loaded {
-        let selector = Arc::new(Fixed(kind, Grid::default()));
-        Loaded { family: Family::Mlp, selector, vehicle }
-    }
-
-    #[test]
-    fn files_of_one_type_each_answer_for_their_type() {
-        let mut models = Models::default();
-        for kind in ParkingType::ALL {
-            models.add("m", loaded(kind, Vehicle::default())).unwrap();
-        }
-        let selector = models.mlp().unwrap();
-        assert_eq!(selector.kinds().len(), 3);
-        for kind in ParkingType::ALL {
-            let cell = Cell { kind, lane_width: 5.0, spot_width: 3.0, dead_end: 8.0 };
-            let mut out = Vec::new();
-            selector.select(&Features::new(Pose::default(), cell), 1, &mut out);
-            assert_eq!(out[0].x, f64::from(kind as u8));
-        }
-        assert!(models.knn().is_none());
-    }
-
-    #[test]
-    fn another_vehicle_is_refused_another_speed_is_not() {
-        let mut models = Models::default();
-        models.add("a", loaded(ParkingType::Forward, Vehicle::default())).unwrap();
-        let slow = Vehicle { forward_speed: 0.5, ..Vehicle::default() };
-        let wide = Vehicle { width: 2.0, ..Vehicle::default() };
-        assert!(models.check_vehicle("s", &slow).is_ok());
-        let message = models.check_vehicle("s", &wide).unwrap_err().to_string();
-        assert!(message.contains("another vehicle") && message.contains("1.86"), "{message}");
-        assert!(models.add("b", loaded(ParkingType::Reverse, wide)).is_err());
     }
 }

@@ -3,10 +3,11 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::episode::Episode;
+use super::episode::{Case, Episode};
 use super::export::{PathFile, PathFileError};
 use super::report::{self, Provenance};
 use super::rows::{self, Row, RowWriter, RowsError};
+use crate::dataset::write::write_atomically;
 
 /// The folders of a run; either may be absent.
 pub struct Outputs {
@@ -65,10 +66,10 @@ impl Outputs {
     }
 
     /// Saves one episode: its row, and its path where paths are wanted.
-    pub fn take(&mut self, episode: &Episode) -> Result<(), OutputError> {
+    pub fn take(&mut self, case: &Case, episode: &Episode) -> Result<(), OutputError> {
         self.push(&episode.row)?;
         if let (Some(dir), Some(path)) = (&self.paths, &episode.path) {
-            path.write(&dir.join(PathFile::file_name(&episode.row.scene, &episode.row.method)))?;
+            path.write(&dir.join(PathFile::file_name(&case.scene, &episode.row.method)))?;
         }
         Ok(())
     }
@@ -90,7 +91,7 @@ impl Outputs {
         let Some(dir) = self.out else { return Ok(()) };
         rows::write_parquet(&dir.join("rows.parquet"), rows)?;
         let path = dir.join("report.md");
-        rows::write_atomically(&path, report::markdown(title, rows, provenance).as_bytes())
+        write_atomically(&path, report::markdown(title, rows, provenance).as_bytes())
             .map_err(|error| OutputError::Report { path, error })
     }
 }

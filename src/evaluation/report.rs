@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::metrics::{self, Group};
 use super::rows::Row;
 use super::table;
+use crate::dataset::schema::GIT_REVISION;
 
 /// Where and how a run was made.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -34,11 +35,6 @@ pub struct Provenance {
     pub max_expansions: usize,
 }
 
-/// Git revision of this build, `unknown` outside a checkout.
-pub fn git_revision() -> &'static str {
-    option_env!("N3P_GIT_REVISION").unwrap_or("unknown")
-}
-
 impl Provenance {
     /// This machine, this build, now.
     pub fn here(scenes: String, seed: u64, max_expansions: usize, threads: usize) -> Self {
@@ -52,7 +48,7 @@ impl Provenance {
             cores: std::thread::available_parallelism().map_or(1, |n| n.get()),
             threads,
             crate_version: env!("CARGO_PKG_VERSION").to_owned(),
-            git_revision: git_revision().to_owned(),
+            git_revision: GIT_REVISION.to_owned(),
             scenes,
             seed,
             max_expansions,

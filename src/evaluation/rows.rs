@@ -12,6 +12,7 @@ use arrow_array::{ArrayRef, BooleanArray, Float64Array, RecordBatch, StringArray
 use parquet::arrow::ArrowWriter;
 use serde::{Deserialize, Serialize};
 
+use crate::dataset::write::write_atomically;
 use crate::world::{Level, ParkingType};
 
 /// The result of one method on one scene. Columns that describe a path are empty where
@@ -84,7 +85,8 @@ impl Row {
         Row { plan_time_s: 0.0, ..self.clone() }
     }
 
-    fn fields(&self) -> [String; 16] {
+    /// The values as text, in the order of [`Row::COLUMNS`].
+    pub fn fields(&self) -> [String; 16] {
         fn text<T: ToString>(v: &Option<T>) -> String {
             v.as_ref().map(T::to_string).unwrap_or_default()
         }
@@ -259,15 +261,6 @@ pub fn write_parquet(path: &Path, rows: &[Row]) -> Result<(), RowsError> {
     writer.write(&batch).map_err(parquet)?;
     writer.close().map_err(parquet)?;
     write_atomically(path, &bytes).map_err(|error| RowsError::Io { path: path.to_owned(), error })
-}
-
-/// Writes `bytes` to a temporary file beside `path`, then renames it.
-pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let temporary = path.with_added_extension("tmp");
-    let mut file = File::create(&temporary)?;
-    file.write_all(bytes)?;
-    file.sync_all()?;
-    std::fs::rename(&temporary, path)
 }
 
 fn quoted(field: &str) -> String {

@@ -11,6 +11,7 @@ use super::models::{Models, ModelsError};
 use super::rows::Row;
 use crate::planners::{HybridAStarConfig, Planner, Problem, ProblemError};
 use crate::vehicle::Vehicle;
+use crate::world::generate::{GeneratorConfig, GeneratorError, generate};
 use crate::world::scene::SceneError;
 use crate::world::{Level, ParkingType, Scene};
 
@@ -40,7 +41,7 @@ pub enum SuiteError {
     #[error("scene name \"{0}\" occurs twice; give every scene a name of its own")]
     SameName(String),
     /// A scene has no solution by its own data.
-    #[error("{scene}: {error}; move it, or leave this scene out")]
+    #[error("scene {scene}: {error}; move it, or leave this scene out")]
     Unsolvable {
         /// Name of the scene.
         scene: String,
@@ -50,6 +51,9 @@ pub enum SuiteError {
     /// A method cannot be built.
     #[error(transparent)]
     Method(#[from] MethodError),
+    /// No scenes can be generated for the vehicle.
+    #[error("no scenes for this vehicle: {0}")]
+    Generator(#[from] GeneratorError),
     /// A model does not fit.
     #[error(transparent)]
     Models(#[from] ModelsError),
@@ -62,27 +66,24 @@ pub fn generated(
     levels: &[Level],
     count: usize,
     seed: u64,
-) -> Vec<Case> {
+) -> Result<Vec<Case>, SuiteError> {
+    let config = GeneratorConfig::default();
+    config.validate(vehicle)?;
     let mut cases = Vec::new();
     for &kind in kinds {
         for &level in levels {
             for index in 0..count as u64 {
-                let scene = generate(vehicle, kind, level, seed, index);
+                let scene = generate(&config, vehicle, kind, level, seed, index);
                 cases.push(Case { scene, kind: Some(kind), level: Some(level) });
             }
         }
     }
-    cases
-}
-
-fn generate(vehicle: &Vehicle, kind: ParkingType, level: Level, seed: u64, index: u64) -> Scene {
-    let _ = (vehicle, kind, level, seed, index);
-    unimplemented!("world::generate")
+    Ok(cases)
 }
 
 /// The scenes of a folder, of one parking type if `kind` is given.
 pub fn from_folder(dir: &Path, kind: Option<ParkingType>) -> Result<Vec<Case>, SuiteError> {
-    let cases: Vec<Case> = read_dir(dir)?
+    let cases: Vec<Case> = Scene::read_dir(dir)?
         .into_iter()
         .filter(|scene| kind.is_none() || scene.parking_type == kind)
         .map(|scene| Case { kind: scene.parking_type, level: None, scene })
@@ -97,10 +98,6 @@ pub fn from_folder(dir: &Path, kind: Option<ParkingType>) -> Result<Vec<Case>, S
     Ok(cases)
 }
 
-fn read_dir(dir: &Path) -> Result<Vec<Scene>, SceneError> {
-    unimplemented!("Scene::read_dir of {}", dir.display())
-}
-
 /// Checks, before anything runs, that every method can be built and every scene planned.
 pub fn check(cases: &[Case], models: &Models, config: &SuiteConfig) -> Result<(), SuiteError> {
     let mut names = std::collections::HashSet::new();
@@ -112,6 +109,9 @@ pub fn check(cases: &[Case], models: &Models, config: &SuiteConfig) -> Result<()
         }
         if config.methods.iter().any(|m| m.needs_model()) {
             models.check_vehicle(&scene.name, &scene.vehicle)?;
+        }
+        if let Some(kind) = case.kind {
+            config.methods.iter().try_for_each(|m| models.check_kind(*m, kind))?;
         }
         Problem::new(scene)
             .map_err(|error| SuiteError::Unsolvable { scene: scene.name.clone(), error })?;
@@ -136,7 +136,7 @@ pub fn run<E>(
     models: &Models,
     config: &SuiteConfig,
     skip: usize,
-    mut sink: impl FnMut(&Episode) -> Result<(), E>,
+    mut sink: impl FnMut(&Case, &Episode) -> Result<(), E>,
 ) -> Result<Vec<Row>, E>
 where
     E: From<SuiteError>,
@@ -172,7 +172,7 @@ where
         for (job, episode) in receive {
             waiting.insert(job, episode);
             while let Some(episode) = waiting.remove(&(skip + rows.len())) {
-                sink(&episode)?;
+                sink(&cases[(skip + rows.len()) / per_case], &episode)?;
                 rows.push(episode.row);
             }
         }
