@@ -7,8 +7,8 @@
 //!
 //! Ours runs from the goal to the start (see [`super::search`]): measured on the cells of
 //! tight bays this takes 10 to 100 times fewer expansions than the other way round. When
-//! the coarse lattice is exhausted, as in a parallel spot barely longer than the car, a
-//! fine one gets its turn.
+//! a coarse lattice is exhausted, as in a parallel spot barely longer than the car, a finer
+//! one gets its turn.
 
 use serde::{Deserialize, Serialize};
 
@@ -28,10 +28,9 @@ use super::{Budget, NoPath, PlanResult, Planner, Problem};
 pub struct HybridAStarConfig {
     /// The cost of driving.
     pub cost: CostModel,
-    /// The lattice tried first.
-    pub coarse: Resolution,
-    /// The lattice tried when the coarse one is exhausted.
-    pub fine: Resolution,
+    /// The lattices, coarse to fine: each is tried when the one before is exhausted or has
+    /// spent half of what was left of the budget.
+    pub resolutions: [Resolution; 3],
     /// Side of a cell of the A* cost-to-go, metres.
     pub cost_to_go_cell: f64,
     /// The search stays within the box of start and goal grown by this, metres.
@@ -62,19 +61,20 @@ pub struct Resolution {
 }
 
 impl Resolution {
-    fn validate(&self, name: &str) -> Result<(), String> {
+    fn validate(&self) -> Result<(), String> {
         let number = |field: &str, v: f64, low: f64, high: f64| {
             if (low..=high).contains(&v) {
                 return Ok(());
             }
-            Err(format!("planner.{name}.{field} is {v}; expected a number from {low} to {high}"))
+            Err(format!("planner.resolutions.{field} is {v}; expected a number from {low} to {high}"))
         };
         number("cell", self.cell, 0.02, 5.0)?;
         number("headings", self.headings as f64, 8.0, 1440.0)?;
         number("step", self.step, 0.02, 10.0)?;
         number("steers", self.steers as f64, 3.0, 63.0)?;
         if self.steers.is_multiple_of(2) {
-            return Err(format!("planner.{name}.steers is {}; expected an odd number", self.steers));
+            let steers = self.steers;
+            return Err(format!("planner.resolutions.steers is {steers}; expected an odd number"));
         }
         Ok(())
     }
@@ -84,8 +84,11 @@ impl Default for HybridAStarConfig {
     fn default() -> Self {
         Self {
             cost: CostModel::default(),
-            coarse: Resolution { cell: 0.25, headings: 120, step: 0.4, steers: 5 },
-            fine: Resolution { cell: 0.05, headings: 360, step: 0.2, steers: 3 },
+            resolutions: [
+                Resolution { cell: 0.25, headings: 120, step: 0.4, steers: 5 },
+                Resolution { cell: 0.05, headings: 360, step: 0.2, steers: 3 },
+                Resolution { cell: 0.02, headings: 720, step: 0.05, steers: 3 },
+            ],
             cost_to_go_cell: 0.5,
             domain_margin: 12.0,
             entry_straight: true,
@@ -111,8 +114,7 @@ impl HybridAStarConfig {
                 return Err(format!("planner.{field} is {v}; expected a number from {low} to {high}"));
             }
         }
-        self.coarse.validate("coarse")?;
-        self.fine.validate("fine")
+        self.resolutions.iter().try_for_each(Resolution::validate)
     }
 }
 
@@ -176,19 +178,19 @@ impl HybridAStar {
         if let Some(c) = self.connect(problem, start, goal) {
             return Ok(Leg { path: Path::new(start, c.segments()), entry: c.entry_index });
         }
-        // The fine lattice is left its share even when the coarse one goes on and on.
-        let reserve = *expansions / 2;
-        *expansions -= reserve;
-        let coarse = self.config.coarse;
-        let first = self.search_leg(&coarse, problem, start, goal, expansions);
-        *expansions += reserve;
-        match first {
-            Err(NoPath::Exhausted | NoPath::BudgetSpent) => {
-                let fine = self.config.fine;
-                self.search_leg(&fine, problem, start, goal, expansions)
+        let mut result = Err(NoPath::BudgetSpent);
+        for (i, resolution) in self.config.resolutions.into_iter().enumerate() {
+            // Finer lattices are left their share even when a coarse one goes on and on.
+            let last = i + 1 == self.config.resolutions.len();
+            let reserve = if last { 0 } else { *expansions / 2 };
+            *expansions -= reserve;
+            result = self.search_leg(&resolution, problem, start, goal, expansions);
+            *expansions += reserve;
+            if !matches!(result, Err(NoPath::Exhausted | NoPath::BudgetSpent)) {
+                break;
             }
-            result => result,
         }
+        result
     }
 
     /// One search at one resolution.
