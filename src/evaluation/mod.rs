@@ -3,8 +3,10 @@
 //! Reading order: a [`Method`] is built from [`Models`]; [`episode`] runs one method on
 //! one scene, exports the path ([`export`]) and has it checked by the independent
 //! [`oracle`]; [`suite`] does so for all; [`rows`] are saved; [`metrics`] summarises them,
-//! [`table`] lays them out beside the paper's, [`report`] writes them down.
+//! [`table`] lays them out beside the paper's, [`report`] writes them down. [`draw`] makes
+//! pictures of scenes and paths.
 
+pub mod draw;
 pub mod episode;
 pub mod export;
 mod method;

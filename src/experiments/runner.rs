@@ -27,8 +27,7 @@ use crate::dataset::{CollectError, CollectOptions, Dataset, DatasetError, collec
 use crate::evaluation::report::Provenance;
 use crate::evaluation::rows::{Row, RowsError, read_csv};
 use crate::evaluation::suite;
-use crate::evaluation::{Method, Models, ModelsError, OutputError, Outputs};
-use crate::evaluation::{SuiteConfig, SuiteError};
+use crate::evaluation::{Models, ModelsError, OutputError, Outputs, SuiteConfig, SuiteError};
 use crate::training::{self, TrainingError};
 use crate::world::ParkingType;
 

@@ -5,8 +5,8 @@
 //! straight that is checked itself. Curves to several of these *entries* are tried, the
 //! cheapest first.
 
-use crate::curves::reeds_shepp::{self, Word};
 use crate::curves::Segment;
+use crate::curves::reeds_shepp::{self, Word};
 use crate::geometry::Pose;
 use crate::vehicle::Vehicle;
 
@@ -263,7 +263,8 @@ pub(super) fn least_curve_cost(
     reeds_shepp::words(from, to, vehicle.turning_radius(), words);
     // Straightening the wheels at the start is not charged: a lower bound for any state.
     let costs = words.iter().map(|w| {
-        let steer = w.segments().first().map_or(0.0, |s| vehicle.max_steer * sign_or_zero(s.curvature));
+        let steer =
+            w.segments().first().map_or(0.0, |s| vehicle.max_steer * sign_or_zero(s.curvature));
         curve_cost(w, DriveState { gear: None, steer }, vehicle, model).0
     });
     costs.fold(f64::INFINITY, f64::min)

@@ -162,9 +162,12 @@ mod tests {
 
     #[test]
     fn an_enclosed_goal_is_infinitely_far() {
-        let ring = [(-3.0, -3.0, 3.0, -2.8), (-3.0, 2.8, 3.0, 3.0), (-3.0, -3.0, -2.8, 3.0), (
-            2.8, -3.0, 3.0, 3.0,
-        )];
+        let ring = [
+            (-3.0, -3.0, 3.0, -2.8),
+            (-3.0, 2.8, 3.0, 3.0),
+            (-3.0, -3.0, -2.8, 3.0),
+            (2.8, -3.0, 3.0, 3.0),
+        ];
         let polygons = ring
             .map(|(a, b, c, d)| Polygon::rectangle(Pose::default(), Aabb::new(a, b, c, d)))
             .to_vec();

@@ -66,7 +66,9 @@ impl Resolution {
             if (low..=high).contains(&v) {
                 return Ok(());
             }
-            Err(format!("planner.resolutions.{field} is {v}; expected a number from {low} to {high}"))
+            Err(format!(
+                "planner.resolutions.{field} is {v}; expected a number from {low} to {high}"
+            ))
         };
         number("cell", self.cell, 0.02, 5.0)?;
         number("headings", self.headings as f64, 8.0, 1440.0)?;
@@ -111,7 +113,9 @@ impl HybridAStarConfig {
             ("heuristic_weight", self.heuristic_weight, 0.0, 100.0),
         ] {
             if !(v.is_finite() && (low..=high).contains(&v)) {
-                return Err(format!("planner.{field} is {v}; expected a number from {low} to {high}"));
+                return Err(format!(
+                    "planner.{field} is {v}; expected a number from {low} to {high}"
+                ));
             }
         }
         self.resolutions.iter().try_for_each(Resolution::validate)

@@ -13,13 +13,13 @@ use crate::geometry::{Aabb, Pose, wrap_angle};
 use crate::vehicle::{Gear, Vehicle};
 use crate::world::collision::Sweep;
 
+use super::Problem;
 use super::analytic::GoalSet;
 use super::cost::{CostModel, DriveState};
 use super::cost_to_go::CostToGo;
 use super::hybrid_astar::{HybridAStarConfig, Resolution, inscribed_radius};
 use super::lattice::Lattice;
 use super::nonholonomic::NonHolonomic;
-use super::Problem;
 
 /// Why the queue ran empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -136,12 +136,7 @@ impl Search {
         }
     }
 
-    fn prepare_primitives(
-        &mut self,
-        resolution: &Resolution,
-        vehicle: &Vehicle,
-        footprint: &Aabb,
-    ) {
+    fn prepare_primitives(&mut self, resolution: &Resolution, vehicle: &Vehicle, footprint: &Aabb) {
         self.primitives.clear();
         let half = (resolution.steers / 2) as i32;
         for gear in [Gear::Forward, Gear::Backward] {

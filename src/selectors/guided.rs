@@ -69,7 +69,12 @@ impl GuidedPlanner {
         self.poses.iter_mut().for_each(|p| p.y += found.shift);
     }
 
-    fn plan_paper(&mut self, problem: &Problem, found: &[Abstraction], left: &mut usize) -> Attempt {
+    fn plan_paper(
+        &mut self,
+        problem: &Problem,
+        found: &[Abstraction],
+        left: &mut usize,
+    ) -> Attempt {
         let found = *found.first()?;
         self.select(problem, &found, 1);
         let pose = *self.poses.first()?;
@@ -145,7 +150,11 @@ impl GuidedPlanner {
         })
     }
 
-    fn fall_back(&mut self, problem: &Problem, left: &mut usize) -> Result<(Path, Guidance), NoPath> {
+    fn fall_back(
+        &mut self,
+        problem: &Problem,
+        left: &mut usize,
+    ) -> Result<(Path, Guidance), NoPath> {
         let goal = self.hars.goal_set(problem);
         let leg = self.hars.leg(problem, problem.start, &goal, left)?;
         let guidance = Guidance { abstraction: None, preparatory: None, route: Route::Fallback };

@@ -63,7 +63,12 @@ pub fn abstractions(obstacles: &Obstacles, kind: ParkingType, grid: &Grid) -> Ve
 }
 
 /// The maximal cells whose frame lies `shift` metres along +y.
-fn at_shift(edges: &[(Vec2, Vec2)], kind: ParkingType, grid: &Grid, shift: f64) -> Vec<Abstraction> {
+fn at_shift(
+    edges: &[(Vec2, Vec2)],
+    kind: ParkingType,
+    grid: &Grid,
+    shift: f64,
+) -> Vec<Abstraction> {
     let boundary = grid.lane_boundary(kind) + shift;
     let floor = shift - grid.lane_boundary(kind);
     let Some(spot_width) = spot_width(edges, floor, boundary) else { return Vec::new() };

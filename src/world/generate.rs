@@ -294,17 +294,19 @@ impl Lot<'_> {
             self.fill(&row, next, side, side * end);
         }
         let neighbour_end = self.polygons.iter().map(|p| p.aabb().max.x).fold(0.0, f64::max);
-        let right = row_end.max(neighbour_end) + WALL;
-        let behind = -self.boundary - self.between([0.0, 0.1]);
-        self.wall(Aabb::new(-EXTENT - 1.0, behind - WALL, right, behind));
 
+        let behind = -self.boundary - self.between([0.0, 0.1]);
         let far_side = self.far_side(row_end);
-        self.wall(Aabb::new(-EXTENT - 1.0, far_side, row_end + 2.0, far_side + WALL));
+        // The curbs end where the wall across the lane meets them.
+        let (mut right, mut far_right) = (row_end, row_end);
         if let Some(d) = dead_end {
             // A neighbour that reaches beyond the wall closes the row itself.
             let low = if neighbour_end > d - INSET { self.boundary } else { behind };
-            self.dead_end_wall(d, low, far_side);
+            [right, far_right] = self.dead_end_wall(d, low, far_side);
         }
+        right = right.max(neighbour_end) + WALL;
+        self.wall(Aabb::new(-EXTENT - 1.0, behind - WALL, right, behind));
+        self.wall(Aabb::new(-EXTENT - 1.0, far_side, far_right + WALL, far_side + WALL));
         if self.rng.random_bool(self.config.lane_car_probability) {
             self.lane_car(dead_end.is_none());
         }
@@ -372,8 +374,8 @@ impl Lot<'_> {
     }
 
     /// A wall across the lane, square or inclined within the lane; from y = `low` to `high`.
-    /// Its nearest point over the lane is at x = `d`.
-    fn dead_end_wall(&mut self, d: f64, low: f64, high: f64) {
+    /// Its nearest point over the lane is at x = `d`. Returns x of its two ends.
+    fn dead_end_wall(&mut self, d: f64, low: f64, high: f64) -> [f64; 2] {
         let inclined = self.rng.random_bool(self.config.incline_probability);
         let incline = self.between([-self.config.max_incline, self.config.max_incline]);
         let slope = if inclined { incline.tan() } else { 0.0 };
@@ -387,6 +389,7 @@ impl Lot<'_> {
             let (a, b) = (face(w[0]), face(w[1]));
             self.polygons.extend(Polygon::new(vec![a, a + thick, b + thick, b]));
         }
+        [face(low).x, face(high).x]
     }
 
     /// A car standing in the lane, where it leaves room to pass and is away from the spot.

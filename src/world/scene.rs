@@ -192,7 +192,8 @@ impl Scene {
             Err(SceneError::Invalid { path: path.to_owned(), field, message })
         };
         let numbers = |field: &dyn Fn() -> String, values: &[f64]| {
-            let Some(v) = values.iter().find(|v| !(v.abs() <= Self::MAX_COORDINATE)) else {
+            let Some(v) = values.iter().find(|v| v.is_nan() || v.abs() > Self::MAX_COORDINATE)
+            else {
                 return Ok(());
             };
             let message = if v.is_finite() {

@@ -29,8 +29,7 @@ pub fn guess(scene: &Scene) -> SpotGuess {
     let center = scene.vehicle.body_center(scene.goal);
     // Right-handed first: the goal heading is `goal_heading` of the kind.
     let x_heading = scene.goal.heading - kind.goal_heading();
-    let plain =
-        Frame { origin_in_world: Pose { heading: x_heading, ..center }, mirrored: false };
+    let plain = Frame { origin_in_world: Pose { heading: x_heading, ..center }, mirrored: false };
     let start = plain.local_from_world(scene.start);
     let mirrored = match kind {
         // +x is the goal heading; the lane is on the side the car comes from.

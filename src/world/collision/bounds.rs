@@ -49,9 +49,9 @@ impl ConvexBounds {
         let radius = radius.abs();
         // The arc's farthest point along a normal is an end, unless the normal's own
         // direction from the centre lies within the arc.
-        self.sides.iter().all(|(n, offset)| {
-            n.dot(&middle) < radius * ch || n.dot(&center) + radius <= *offset
-        })
+        self.sides
+            .iter()
+            .all(|(n, offset)| n.dot(&middle) < radius * ch || n.dot(&center) + radius <= *offset)
     }
 }
 

@@ -68,9 +68,9 @@ impl CollisionWorld {
         }
         let body = BodyFrame::new(pose);
         let near = body.aabb_of(&self.footprint);
-        let touches = self.index.any_near(&near, |a, b| {
-            segment_in_box(body.local(a), body.local(b), &self.footprint)
-        });
+        let touches = self
+            .index
+            .any_near(&near, |a, b| segment_in_box(body.local(a), body.local(b), &self.footprint));
         // No edge touches the footprint, so it lies wholly inside or outside each polygon.
         let inside = |(aabb, p): &(Aabb, Polygon)| {
             aabb.contains(pose.position()) && p.contains(pose.position())

@@ -185,9 +185,7 @@ impl ArcSweep {
             }
             let root = discriminant.sqrt();
             for t in [(-ad - root) / dd, (-ad + root) / dd] {
-                if (0.0..=1.0).contains(&t)
-                    && (a + d * t).dot(&middle) >= rho_sq * self.cos_half
-                {
+                if (0.0..=1.0).contains(&t) && (a + d * t).dot(&middle) >= rho_sq * self.cos_half {
                     return true;
                 }
             }
