@@ -42,16 +42,22 @@ fn straight(length: f64) -> Path {
 
 #[test]
 fn accepts_a_good_path_and_measures_its_clearance() {
-    // Full lock, gear changes, and a wall 0.3 m beside the straight beginning.
+    // Full lock, gear changes, and a wall along the way whose distance is the lowest
+    // corner's.
     let v = Vehicle::default();
     let k = v.max_curvature();
     for origin in [[0.0, 0.0], [5e5, -4e5]] {
         let [ox, oy] = origin;
-        let path = driven(Pose::new(ox, oy, 0.0), &[(0.0, 3.0), (k, 4.0), (-k, -2.0), (0.0, -0.5)]);
-        let wall = block(ox - 5.0, oy - 2.0, ox + 30.0, oy - v.width / 2.0 - 0.3);
+        let segments = [(0.0, 3.0), (k, 4.0), (-k, -2.0), (0.0, -0.5)];
+        let path = driven(Pose::new(ox, oy, 0.0), &segments);
+        let samples = path.sample(0.01);
+        let corners =
+            samples.iter().flat_map(|s| v.footprint_at(s.pose).vertices().to_vec()).map(|c| c.y);
+        let lowest = corners.fold(f64::INFINITY, f64::min);
+        let wall = block(ox - 50.0, lowest - 2.0, ox + 50.0, lowest - 0.3);
         let (scene, file) = around(&path, vec![wall]);
         let clearance = oracle::check(&scene, &file).unwrap();
-        assert!(clearance < 0.3 + 1e-6 && clearance >= 0.0, "{clearance}");
+        assert!((clearance - 0.3).abs() < 1e-3, "{clearance}");
     }
     let (scene, file) = around(&straight(5.0), vec![block(-9.0, 1.23, 20.0, 9.0)]);
     assert!((oracle::check(&scene, &file).unwrap() - 0.3).abs() < 1e-9);

@@ -89,7 +89,9 @@ pub struct Group {
 /// Summarises `rows` by level (hardest last) and type. `seed` drives the resampling.
 pub fn summarise(rows: &[Row], seed: u64) -> Vec<Group> {
     let mut keys: Vec<_> = rows.iter().map(|r| (r.level, r.kind)).collect();
-    keys.sort();
+    // Types as in every table, scenes of no known type last.
+    let place = |kind| ParkingType::ALL.iter().position(|k| Some(*k) == kind);
+    keys.sort_by_key(|(level, kind)| (*level, place(*kind).unwrap_or(usize::MAX)));
     keys.dedup();
     let mut groups = Vec::new();
     for (g, (level, kind)) in keys.into_iter().enumerate() {

@@ -115,7 +115,7 @@ included; Δδ, length and N_dc over the solved ones.\n\n\
 the smallest mean time of this run; its interval resamples scenes, so times stay paired. \
 Intervals are 95 % bootstrap percentile intervals (2000 resamples).\n\n\
 The paper's lines were measured by its authors on their machine and their scenes: compare \
-ratios, not seconds. Every path here was accepted by a check written apart from the planners, \
+ratios, not times. Every path here was accepted by a check written apart from the planners, \
 or counts as a failure.\n";
 
 /// One sentence per method, over everything.

@@ -37,6 +37,18 @@ pub struct PaperRow {
     pub cells: [String; 10],
 }
 
+impl PaperRow {
+    /// The cells with times in milliseconds, as in our tables.
+    fn in_milliseconds(&self) -> [String; 10] {
+        let mut cells = self.cells.clone();
+        for time in &mut cells[..4] {
+            let seconds: f64 = time.parse().expect("a number in the embedded table");
+            *time = figures(seconds * 1e3);
+        }
+        cells
+    }
+}
+
 /// The paper's three tables.
 pub fn paper_rows() -> Vec<PaperRow> {
     let lines = include_str!("paper_tables.csv").lines().filter(|l| !l.starts_with('#')).skip(1);
@@ -71,7 +83,7 @@ pub fn comparison(groups: &[Group]) -> Vec<Table> {
                         && Some(p.method.as_str()) == name
                 });
                 if let Some(p) = printed {
-                    rows.push(line(group.kind, &p.method, "paper", p.cells.clone()));
+                    rows.push(line(group.kind, &p.method, "paper", p.in_milliseconds()));
                 }
             }
         }
@@ -80,7 +92,7 @@ pub fn comparison(groups: &[Group]) -> Vec<Table> {
             "fail %", "N_dc", "max N_dc", "N_node",
         ];
         tables.push(Table {
-            title: format!("{}: T in s, Δδ in rad, length in m", level_title(level)),
+            title: format!("{}: T in ms, Δδ in rad, length in m", level_title(level)),
             headers: headers.map(str::to_owned).to_vec(),
             rows,
             text_columns: 3,
@@ -109,8 +121,11 @@ pub fn speed_ups(groups: &[Group]) -> Table {
                 s.method.clone(),
                 reference,
                 s.scenes.to_string(),
-                figures(s.mean_t_s),
-                span(s.mean_t_interval_s),
+                figures(s.mean_t_s * 1e3),
+                span(Interval {
+                    low: s.mean_t_interval_s.low * 1e3,
+                    high: s.mean_t_interval_s.high * 1e3,
+                }),
                 ratio,
                 interval,
                 saved,
@@ -132,7 +147,7 @@ pub fn speed_ups(groups: &[Group]) -> Table {
         "min clearance",
     ];
     Table {
-        title: "Mean times and speed-ups: T in s, clearance in m".to_owned(),
+        title: "Mean times and speed-ups: T in ms, clearance in m".to_owned(),
         headers: headers.map(str::to_owned).to_vec(),
         rows,
         text_columns: 4,
@@ -178,10 +193,10 @@ fn line(kind: Option<ParkingType>, method: &str, source: &str, cells: [String; 1
 fn numbers(s: &Summary) -> [String; 10] {
     let maybe = |v: Option<f64>, digits| v.map_or("–".to_owned(), |v| format!("{v:.digits$}"));
     [
-        figures(s.min_t_s),
-        figures(s.mean_t_s),
-        figures(s.median_t_s),
-        figures(s.p95_t_s),
+        figures(s.min_t_s * 1e3),
+        figures(s.mean_t_s * 1e3),
+        figures(s.median_t_s * 1e3),
+        figures(s.p95_t_s * 1e3),
         maybe(s.mean_abs_steer_change_rad, 3),
         maybe(s.mean_length_m, 2),
         format!("{:.1}", s.fail_percent),
@@ -265,8 +280,8 @@ mod tests {
         let sources: Vec<_> = tables[0].rows.iter().map(|r| (&r[1][..], &r[2][..])).collect();
         let expected = [("ha-rs", "this run"), ("HA* with RS", "paper"), ("n3p", "this run")];
         assert_eq!(sources, expected);
-        assert_eq!(tables[0].rows[1][4], "16.06");
-        assert_eq!(tables[0].rows[2][3], "0.001234");
+        assert_eq!(tables[0].rows[1][4], "16060");
+        assert_eq!(tables[0].rows[2][3], "1.234");
         let lengths: Vec<_> = tables[0].text().lines().skip(1).map(|l| l.chars().count()).collect();
         assert!(lengths.windows(2).all(|w| w[0] == w[1]), "{}", tables[0].text());
         assert_eq!(failures(&rows).rows.len(), 1);

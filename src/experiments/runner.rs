@@ -125,7 +125,7 @@ pub fn differences(expected: &[Row], found: &[Row]) -> Vec<String> {
             lines.push(format!("{}: missing in the new run", name(row)));
             continue;
         };
-        let columns = Row::COLUMNS.iter().zip(row.untimed().fields().into_iter());
+        let columns = Row::COLUMNS.iter().zip(row.untimed().fields());
         for ((column, old), new) in columns.zip(other.untimed().fields()) {
             if old != new {
                 lines.push(format!("{}: {column} was {old}, is {new}", name(row)));
@@ -228,17 +228,11 @@ impl Runner<'_> {
     fn train(&self) -> Result<(), ExperimentError> {
         let data = self.collect_settings();
         let kinds = &self.config.evaluate.types;
-        let mut dataset = None;
-        let mut read = || -> Result<Dataset, ExperimentError> {
-            if dataset.is_none() {
-                dataset = Some(Dataset::read(&self.path("dataset"), None)?);
-            }
-            Ok(dataset.clone().expect("just read"))
-        };
+        let mut read = None;
         let knn = self.model("knn.bin");
         let knn_settings = settings(("knn", &data));
         if self.begin("train-knn", &knn_settings)? != Todo::Nothing || !knn.exists() {
-            let set = read()?;
+            let set = self.dataset(&mut read)?;
             training::knn::train(&set.metadata, &set.samples, &set.sha256, kinds, &knn)?;
             self.record("train-knn", &knn_settings, true)?;
         }
@@ -252,7 +246,7 @@ impl Runner<'_> {
             if self.begin(&stage, &mlp_settings)? == Todo::Nothing && out.exists() {
                 continue;
             }
-            let set = read()?;
+            let set = self.dataset(&mut read)?;
             let log =
                 training::mlp::train(&set.metadata, &set.samples, &set.sha256, kind, mlp, &out)?;
             tracing::info!(
@@ -264,6 +258,14 @@ impl Runner<'_> {
             self.record(&stage, &mlp_settings, true)?;
         }
         Ok(())
+    }
+
+    /// The data set, read at most once.
+    fn dataset<'d>(&self, read: &'d mut Option<Dataset>) -> Result<&'d Dataset, ExperimentError> {
+        if read.is_none() {
+            *read = Some(Dataset::read(&self.path("dataset"), None)?);
+        }
+        Ok(read.as_ref().expect("just read"))
     }
 
     fn models(&self) -> Result<Models, ExperimentError> {
