@@ -6,10 +6,14 @@ use std::fs;
 use std::path::Path;
 
 use fixtures::{assert_same_files, collect, config, sample};
+use n3p::dataset::collect::collect_with;
 use n3p::dataset::{CollectConfig, CollectOptions, Dataset, DatasetError, Part, Status};
+use n3p::geometry::Pose;
+use n3p::rng::{Stream, rng};
 use n3p::vehicle::Vehicle;
 use n3p::world::ParkingType;
 use n3p::world::ParkingType::{Forward, Parallel, Reverse};
+use rand::RngExt;
 
 const FRESH: CollectOptions = CollectOptions { resume: false, part: Part::ALL };
 const RESUME: CollectOptions = CollectOptions { resume: true, part: Part::ALL };
@@ -205,27 +209,13 @@ fn rows_take_few_bytes() {
     let options = CollectOptions { resume: false, part: "1/36".parse().unwrap() };
     let make = || {
         |kind, cell, index| {
-            let (mut a, mut b) = (sample(&config, kind, cell, 0), u64::from(cell * 256 + index));
-            // Numbers without pattern, in the ranges of real rows: a linear congruence.
-            let mut random = |min: f64, max: f64| {
-                b = b
-                    .wrapping_mul(6_364_136_223_846_793_005)
-                    .wrapping_add(1_442_695_040_888_963_407);
-                min + (max - min) * (b >> 11) as f64 / (1u64 << 53) as f64
-            };
-            random(0.0, 1.0);
+            let mut rng = rng(1, Stream::Bootstrap, u64::from(cell * 256 + index));
+            let mut random = |min: f64, max: f64| rng.random_range(min..max);
+            let mut a = sample(&config, kind, cell, 0);
             a.sample_index = index;
             a.status = Status::Solved;
-            a.start = n3p::geometry::Pose::new(
-                random(-10.0, 12.0),
-                random(2.75, 9.75),
-                random(-1.0, 1.0),
-            );
-            a.rs_start = n3p::geometry::Pose::new(
-                random(-10.0, 12.0),
-                random(2.75, 9.75),
-                random(-3.0, 3.0),
-            );
+            a.start = Pose::new(random(-10.0, 12.0), random(2.75, 9.75), random(-1.0, 1.0));
+            a.rs_start = Pose::new(random(-10.0, 12.0), random(2.75, 9.75), random(-3.0, 3.0));
             a.rs_word = ["L+R-S-", "L-S-R-", "R+S-L-"][random(0.0, 3.0) as usize].to_owned();
             a.rs_lengths = [random(-6.0, 6.0), random(-6.0, 6.0), random(-6.0, 6.0), 0.0, 0.0];
             a.entry = [0.0, -1.0, -2.0][random(0.0, 3.0) as usize];
@@ -235,15 +225,7 @@ fn rows_take_few_bytes() {
             a.rounded()
         }
     };
-    let report = n3p::dataset::collect::collect_with(
-        &config,
-        folder.path(),
-        &[Reverse],
-        options,
-        &bar,
-        make,
-    )
-    .unwrap();
+    let report = collect_with(&config, folder.path(), &[Reverse], options, &bar, make).unwrap();
     let per_row = report[0].bytes as f64 / report[0].rows as f64;
     println!("{per_row:.2} bytes per row");
     assert!(per_row < 35.0, "{per_row} bytes per row");

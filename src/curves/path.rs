@@ -53,6 +53,12 @@ impl Path {
         self.segments.iter().fold(self.start, |pose, s| s.end(pose))
     }
 
+    /// The rest of the path from the beginning of segment `index`.
+    pub fn from_segment(&self, index: usize) -> Path {
+        let start = self.segments[..index].iter().fold(self.start, |pose, s| s.end(pose));
+        Path { start, segments: self.segments[index..].to_vec() }
+    }
+
     /// Driven length, metres.
     pub fn length(&self) -> f64 {
         self.segments.iter().map(|s| s.length.abs()).sum()

@@ -18,14 +18,16 @@
 pub mod collect;
 pub mod config;
 pub mod manifest;
+mod part;
 pub mod read;
 pub mod sampler;
 pub mod schema;
 pub mod split;
 pub mod write;
 
-pub use collect::{CollectError, CollectOptions, Part, TypeReport, collect};
+pub use collect::{CollectError, CollectOptions, TypeReport, collect};
 pub use config::{CollectConfig, ConfigError};
+pub use part::Part;
 pub use read::{Dataset, DatasetError};
 pub use schema::{Metadata, Sample, Status};
 pub use split::validation_cells;

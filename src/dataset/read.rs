@@ -40,7 +40,9 @@ pub enum DatasetError {
         path: PathBuf,
     },
     /// The type asked for was never begun.
-    #[error("{path}: holds no {kind} samples; collect them with n3p-collect --type {kind}")]
+    #[error(
+        "{path}: holds no {kind} samples; collect them with n3p-collect --type {kind} --out {path}"
+    )]
     NoSuchType {
         /// The folder.
         path: PathBuf,
@@ -50,7 +52,7 @@ pub enum DatasetError {
     /// A type lacks its manifest.
     #[error(
         "{path}: incomplete data set ({kind} has no manifest); finish it with n3p-collect \
-         --resume --type {kind}"
+         --resume --type {kind} --out {path}"
     )]
     Incomplete {
         /// The folder.

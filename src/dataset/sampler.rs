@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::config::CollectConfig;
 use super::schema::{Sample, Status, to_step};
 use crate::geometry::{Aabb, Pose, wrap_angle};
-use crate::planners::{Budget, HybridAStar, NoPath, PlanResult, Planner, Problem};
+use crate::planners::{AnalyticTail, Budget, HybridAStar, NoPath, PlanResult, Planner, Problem};
 use crate::rng::{Stream, rng};
 use crate::world::ParkingType;
 use crate::world::cell::Cell;
@@ -62,7 +62,11 @@ impl<'a> Sampler<'a> {
         problem.start = start;
         let budget = Budget { max_expansions: config.max_expansions };
         let result = self.planner.plan(problem, budget);
-        fill(unsolved(start, Status::NoPath), &result, problem.goal).rounded()
+        let tail = result.outcome.as_ref().ok().and_then(|path| {
+            let snap = |p: Pose| to_step(Pose { heading: wrap_angle(p.heading), ..p });
+            self.planner.preparatory_tail(problem, path, snap)
+        });
+        fill(unsolved(start, Status::NoPath), &result, tail.as_ref()).rounded()
     }
 }
 
@@ -96,7 +100,7 @@ fn draw(rng: &mut ChaCha8Rng, lane: &Aabb, heading_max: f64) -> Pose {
 }
 
 /// `row` with what the planner found.
-fn fill(mut row: Sample, result: &PlanResult, goal: Pose) -> Sample {
+fn fill(mut row: Sample, result: &PlanResult, tail: Option<&AnalyticTail>) -> Sample {
     row.expansions = u32::try_from(result.expansions).unwrap_or(u32::MAX);
     let path = match &result.outcome {
         Ok(path) => path,
@@ -106,20 +110,20 @@ fn fill(mut row: Sample, result: &PlanResult, goal: Pose) -> Sample {
             return row;
         }
     };
-    row.status = Status::Solved;
     row.path_length = path.length();
     row.direction_changes = path.direction_changes() as u32;
-    row.rs_start = goal;
+    let Some(tail) = tail else {
+        row.status = Status::NoCurve;
+        return row;
+    };
+    row.status = Status::Solved;
+    row.rs_start = tail.from;
+    row.rs_word = tail.word.name();
     row.rs_lengths = [0.0; 5];
-    row.entry = 0.0;
-    if let Some(tail) = &result.tail {
-        row.rs_start = Pose { heading: wrap_angle(tail.from.heading), ..tail.from };
-        row.rs_word = tail.word.name();
-        for (length, segment) in row.rs_lengths.iter_mut().zip(tail.word.segments()) {
-            *length = segment.length;
-        }
-        row.entry = tail.entry;
+    for (length, segment) in row.rs_lengths.iter_mut().zip(tail.word.segments()) {
+        *length = segment.length;
     }
+    row.entry = tail.entry;
     row
 }
 
@@ -158,7 +162,7 @@ mod tests {
         let row = |result: PlanResult| {
             let start = Pose::new(0.0, 4.0, 0.0);
             let row = Sample::unsolved(cell, 0, 0, start, Status::NoPath, 1);
-            fill(row, &result, Pose::default()).rounded()
+            fill(row, &result, None).rounded()
         };
         let spent = row(PlanResult::none(NoPath::BudgetSpent, 9));
         assert_eq!((spent.status, spent.expansions), (Status::BudgetSpent, 9));
@@ -168,9 +172,8 @@ mod tests {
 
         let segments = [2.5, -1.0].map(Segment::straight);
         let path = Path::new(Pose::default(), segments);
-        let solved =
-            row(PlanResult { outcome: Ok(path), expansions: 4, tail: None, guidance: None });
+        let solved = row(PlanResult { outcome: Ok(path), expansions: 4, guidance: None });
         assert_eq!((solved.path_length, solved.direction_changes), (3.5, 1));
-        assert_eq!(solved.rs_lengths, [0.0; 5]);
+        assert_eq!(solved.status, Status::NoCurve);
     }
 }

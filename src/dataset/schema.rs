@@ -25,13 +25,16 @@ pub enum Status {
     BudgetSpent,
     /// No path exists at the search's resolution.
     NoPath,
+    /// A path was found, but no pose along it is one curve away from the goal.
+    NoCurve,
     /// No free start pose was found in the cell (or its goal is not free).
     NoStart,
 }
 
 impl Status {
     /// Every status.
-    pub const ALL: [Status; 4] = [Self::Solved, Self::BudgetSpent, Self::NoPath, Self::NoStart];
+    pub const ALL: [Status; 5] =
+        [Self::Solved, Self::BudgetSpent, Self::NoPath, Self::NoCurve, Self::NoStart];
 
     /// The name used in the files.
     pub fn name(self) -> &'static str {
@@ -39,6 +42,7 @@ impl Status {
             Self::Solved => "solved",
             Self::BudgetSpent => "budget_spent",
             Self::NoPath => "no_path",
+            Self::NoCurve => "no_curve",
             Self::NoStart => "no_start",
         }
     }
@@ -284,7 +288,7 @@ mod tests {
 
     #[test]
     fn start_steps_are_exact_in_f32() {
-        let p = to_step(Pose::new(-9.999, 11.0001, 1.0471));
+        let p = to_step(Pose::new(-9.999, 11.0001, 0.7777));
         for v in <[f64; 3]>::from(p) {
             assert_eq!((v / Sample::START_STEP).fract(), 0.0);
             assert_eq!(f64::from(v as f32), v);

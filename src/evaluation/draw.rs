@@ -36,7 +36,7 @@ const LEGEND_LINE: f64 = 24.0;
 /// Free space around start, goal and path, metres.
 const PADDING: f64 = 3.0;
 /// The most of it without a path, where the picture is about the surroundings.
-const PADDING_ALONE: f64 = 9.0;
+const PADDING_ALONE: f64 = 12.0;
 /// Distance between the points of a drawn path, metres.
 const STEP: f64 = 0.2;
 /// Distance between the drawn footprints along a path, metres.

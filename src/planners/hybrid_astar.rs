@@ -232,14 +232,28 @@ impl HybridAStar {
         })
     }
 
-    /// Where along `path` a curve to the goal begins: the first of its poses, half a metre
-    /// apart, from which a Reeds-Shepp curve (and an entry straight) reaches the goal
-    /// without contact. The paper's x_rs: reachable from the start, one curve from the goal.
-    pub fn first_tail(&mut self, problem: &Problem, path: &Path) -> Option<AnalyticTail> {
-        const SPACING: f64 = 0.5;
+    /// Where along `path` the parking manoeuvre begins, and the curve from there to the goal.
+    ///
+    /// The manoeuvre begins at the first change of gear, or, without any, where the last
+    /// turn begins; the tail is taken from the first pose from there on, `snap`ped, that a
+    /// Reeds-Shepp curve (and an entry straight) joins to the goal without contact. Like the
+    /// paper's x_rs it is reachable from the start and one curve away from the goal.
+    pub fn preparatory_tail(
+        &mut self,
+        problem: &Problem,
+        path: &Path,
+        snap: impl Fn(Pose) -> Pose,
+    ) -> Option<AnalyticTail> {
+        const SPACING: f64 = 0.25;
         let goal = self.goal_set(problem);
-        let samples = path.sample(SPACING);
-        samples.iter().find_map(|s| Some(self.connect(problem, s.pose, &goal)?.tail()))
+        let manoeuvre = path.from_segment(manoeuvre_begin(path));
+        manoeuvre.sample(SPACING).into_iter().find_map(|sample| {
+            let pose = snap(sample.pose);
+            if !problem.collision.pose_is_free(pose) {
+                return None;
+            }
+            Some(self.connect(problem, pose, &goal)?.tail())
+        })
     }
 
     /// Where the search may go: around start and goal, within the bounds.
@@ -269,6 +283,14 @@ impl Planner for HybridAStar {
             Err(reason) => PlanResult::none(reason, expansions),
         }
     }
+}
+
+/// Index of the segment that the parking manoeuvre begins with.
+fn manoeuvre_begin(path: &Path) -> usize {
+    let segments = &path.segments;
+    let cusp = segments.windows(2).position(|w| w[0].gear() != w[1].gear()).map(|i| i + 1);
+    let last_turn = || segments.iter().rposition(|s| s.curvature != 0.0);
+    cusp.or_else(last_turn).unwrap_or(0)
 }
 
 /// The largest disc around the rear axle inside every footprint, metres.

@@ -129,7 +129,7 @@ pub fn encode(header: &KnnHeader, entries: &[Vec<KnnEntry>]) -> Vec<u8> {
 pub struct KnnFile {
     map: Mmap,
     path: PathBuf,
-    header: KnnHeader,
+    header: Box<KnnHeader>,
     sections: Vec<Section>,
 }
 
@@ -149,7 +149,7 @@ impl KnnFile {
     pub fn open(path: &Path) -> Result<Self, ArtefactError> {
         let map = map(&artefact::open(path)?).map_err(|e| Fault::Unreadable(e).of(path))?;
         let (header, sections) = check(&map).map_err(|fault| fault.of(path))?;
-        Ok(Self { map, path: path.to_owned(), header, sections })
+        Ok(Self { map, path: path.to_owned(), header: Box::new(header), sections })
     }
 
     /// The file's header.

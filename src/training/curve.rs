@@ -41,9 +41,8 @@ fn draw(
             (low.min(high) * 0.8..high * 1.25).log_scale(),
         )?;
     chart.configure_mesh().x_desc("epoch").y_desc("loss").draw()?;
-    let lines: [(&str, RGBColor, fn(&EpochLoss) -> f32); 2] =
-        [("training", BLUE, |l| l.train), ("validation", RED, |l| l.validation)];
-    for (name, colour, value) in lines {
+    for (name, colour) in [("training", BLUE), ("validation", RED)] {
+        let value = |l: &EpochLoss| if name == "training" { l.train } else { l.validation };
         let points = losses.iter().enumerate().map(|(i, l)| (i + 1, value(l)));
         chart
             .draw_series(LineSeries::new(points, colour.stroke_width(2)))?

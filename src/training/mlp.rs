@@ -19,7 +19,7 @@ use super::curve::{self, EpochLoss};
 use super::optimiser::AdamW;
 use super::{Loss, MlpConfig, TrainingError, solved};
 use crate::cli;
-use crate::dataset::{Metadata, Sample};
+use crate::dataset::{Metadata, Sample, validation_cells};
 use crate::geometry::signed_angle;
 use crate::rng::{Stream, rng};
 use crate::selectors::artefact::write_atomic;
@@ -176,22 +176,16 @@ fn features(sample: &Sample) -> [f32; Features::COUNT] {
     Features::new(sample.start, sample.cell).values()
 }
 
-/// Training and validation samples: whole cells validate. Where there is one cell only,
-/// single samples of it do.
+/// Training and validation samples: whole cells validate, at least one. Where there is one
+/// cell only, single samples of it do.
 fn split<'a>(solved: &[&'a Sample], config: &MlpConfig) -> (Vec<&'a Sample>, Vec<&'a Sample>) {
-    let mut cells: Vec<u32> = solved.iter().map(|s| s.cell_index).collect();
-    cells.dedup();
-    let of_cells = cells.len() > 1;
-    let mut units = if of_cells { cells } else { (0..solved.len() as u32).collect() };
-    units.shuffle(&mut rng(config.seed, Stream::Split, 0));
-    let kept = (units.len() as f64 * config.validation_share).ceil() as usize;
-    let mut kept = units[..kept].to_vec();
-    kept.sort_unstable();
-    let mut position = 0..;
-    solved.iter().partition(|s| {
-        let position = position.next().expect("an endless range");
-        kept.binary_search(if of_cells { &s.cell_index } else { &position }).is_err()
-    })
+    let one_cell = solved[0].cell_index == solved[solved.len() - 1].cell_index;
+    let unit = |s: &Sample| if one_cell { s.sample_index } else { s.cell_index };
+    let mut units: Vec<u32> = solved.iter().map(|s| unit(s)).collect();
+    units.dedup();
+    let share = config.validation_share.max(1.0 / units.len() as f64);
+    let kept = validation_cells(units, share, config.seed);
+    solved.iter().partition(|s| !kept.contains(&unit(s)))
 }
 
 /// Normalised rows, ready to be gathered into batches.
@@ -313,7 +307,7 @@ fn evaluate(
     let all: Vec<usize> = (0..rows.len()).collect();
     for batch in all.chunks(EVALUATION_BATCH) {
         let (inputs, outputs) = rows.batch(batch)?;
-        // Detached variables: no graph is kept.
+        // Nothing is learnt here: drop the graph.
         each(model.forward(&inputs)?.detach(), outputs)?;
     }
     Ok(())

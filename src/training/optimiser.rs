@@ -73,7 +73,7 @@ mod tests {
         let theirs = Var::new(&start, &Device::Cpu)?;
         let params = ParamsAdamW { lr: 0.05, weight_decay: 0.1, ..ParamsAdamW::default() };
         let mut reference = candle_nn::AdamW::new(vec![theirs.clone()], params)?;
-        let mut optimiser = AdamW::new(&[ours.clone()], 0.1)?;
+        let mut optimiser = AdamW::new(std::slice::from_ref(&ours), 0.1)?;
         for _ in 0..20 {
             reference.backward_step(&theirs.sqr()?.sum_all()?)?;
             optimiser.step(&ours.sqr()?.sum_all()?.backward()?, 0.05)?;

@@ -120,7 +120,7 @@ impl Default for Grid {
             bay_spot_width: Axis { min: 2.3, max: 4.3, step: 0.25 },
             parallel_spot_width: Axis { min: 6.0, max: 8.0, step: 0.25 },
             dead_end: Axis { min: 4.0, max: 12.0, step: 1.0 },
-            back: 10.0,
+            back: 7.0,
             bay_depth: 5.5,
             parallel_depth: 2.4,
         }
