@@ -1,1 +1,155 @@
-fn main() {}
+//! One scene in, one path out.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::Parser;
+use n3p::cli::{self, BadInput, OrBadInput};
+use n3p::dataset::write::write_atomically;
+use n3p::evaluation::draw::{Drawing, scene_svg};
+use n3p::evaluation::{Case, Episode, EpisodeConfig, Method, Models, episode};
+use n3p::geometry::{Polygon, Pose};
+use n3p::planners::{HybridAStarConfig, Problem};
+use n3p::world::Scene;
+
+/// Plans a path for one parking scene.
+///
+/// Exit code 0: a path was found; 3: there is none (the reason is printed).
+#[derive(Parser)]
+#[command(version)]
+struct Args {
+    /// The scene, .json or TPCAP .csv.
+    #[arg(long, value_name = "FILE")]
+    scene: PathBuf,
+    /// The method [default: n3p where a model fits the scene, else ha-rs].
+    #[arg(long, value_name = "NAME")]
+    method: Option<Method>,
+    /// A trained model; may be given several times [default: knn.bin, or
+    /// mlp-TYPE.safetensors, in the working folder or in models/].
+    #[arg(long = "model", value_name = "FILE")]
+    models: Vec<String>,
+    /// Write the path to this JSON file.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Draw scene and path to this SVG file.
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+    /// Expansion budget.
+    #[arg(long, default_value_t = 200_000, value_name = "N")]
+    max_expansions: usize,
+}
+
+fn main() -> ExitCode {
+    cli::run(|| plan(&Args::parse()))
+}
+
+fn plan(args: &Args) -> Result<ExitCode> {
+    let scene = Scene::read(&args.scene).or_bad_input()?;
+    let file = args.scene.display();
+    let problem = Problem::new(&scene)
+        .map_err(|e| BadInput(format!("{file}: {e}; move it to where the car fits")))?;
+    let (method, models) = choose(args, &scene, &problem)?;
+    let mut planner = method.build(&models, &HybridAStarConfig::default()).or_bad_input()?;
+    let case = Case { kind: problem.kind, level: None, scene };
+    // One run, as it comes: the time includes what a first call costs.
+    let once = EpisodeConfig { repeats: 0, ..EpisodeConfig::new(args.max_expansions) };
+    let episode = episode::run(&case, planner.as_mut(), &once)?;
+
+    if let (Some(out), Some(path)) = (&args.out, &episode.path) {
+        path.write(out).or_bad_input()?;
+    }
+    if let Some(svg) = &args.svg {
+        let picture = picture(&case.scene, &episode, method, &models);
+        write_atomically(svg, picture.as_bytes())
+            .map_err(|e| BadInput(format!("{}: cannot write: {e}", svg.display())))?;
+    }
+    if args.json {
+        let result = serde_json::json!({"row": episode.row, "path": episode.path});
+        println!("{result}");
+    } else {
+        print!("{}", summary(&episode));
+    }
+    match (&episode.path, episode.row.ok) {
+        (None, _) => Ok(ExitCode::from(cli::EXIT_NO_PATH)),
+        (Some(_), true) => Ok(ExitCode::SUCCESS),
+        (Some(_), false) => anyhow::bail!(
+            "{file}: our bug: the path was {}: {}",
+            episode.row.reason,
+            episode.row.checked
+        ),
+    }
+}
+
+/// The method and its models: as told, or the best that fits the scene.
+fn choose(args: &Args, scene: &Scene, problem: &Problem) -> Result<(Method, Models)> {
+    let method = args.method.unwrap_or(Method::N3p);
+    let models = match &args.models[..] {
+        [] => Models::usual(method),
+        given => Models::load(given),
+    };
+    let models = models.or_bad_input()?;
+    let fits = || -> Result<()> {
+        method.build(&models, &HybridAStarConfig::default()).or_bad_input()?;
+        models.check_vehicle(&scene.name, &scene.vehicle).or_bad_input()?;
+        problem.kind.map_or(Ok(()), |kind| models.check_kind(method, kind)).or_bad_input()
+    };
+    let told = args.method.is_some() || !args.models.is_empty();
+    match (if method.needs_model() { fits() } else { Ok(()) }, told) {
+        (Ok(()), _) => Ok((method, models)),
+        (Err(reason), true) => Err(reason),
+        (Err(reason), false) => {
+            tracing::info!("planning with ha-rs: {reason:#}");
+            Ok((Method::HaRs, models))
+        }
+    }
+}
+
+fn summary(episode: &Episode) -> String {
+    let row = &episode.row;
+    let time = row.plan_time_s * 1e3;
+    let (Some(length), Some(changes)) = (row.length_m, row.direction_changes) else {
+        return format!(
+            "{}: no path by {}: {} (after {} expansions, {time:.3} ms)\n",
+            row.scene, row.method, row.reason, row.nodes
+        );
+    };
+    let clearance = row.min_clearance_m.map_or("nothing near".to_owned(), |c| format!("{c:.3} m"));
+    let mut lines = vec![
+        format!("{}: path by {}", row.scene, row.method),
+        format!("  length            {length:.2} m"),
+        format!("  direction changes {changes}"),
+        format!("  clearance         {clearance}"),
+        format!("  planning time     {time:.3} ms"),
+        format!("  expansions        {}", row.nodes),
+    ];
+    if !row.route.is_empty() {
+        lines.push(format!("  route             {}", row.route));
+    }
+    lines.join("\n") + "\n"
+}
+
+/// The scene, and over it the path and what N3P made of the spot.
+fn picture(scene: &Scene, episode: &Episode, method: Method, models: &Models) -> String {
+    let frame = &episode.problem.frame;
+    let path = episode.result.outcome.as_ref().ok().map(|p| p.to_world(frame));
+    let guidance = episode.result.guidance.as_ref();
+    let selector = models.selector(method);
+    let regions = guidance.and_then(|g| g.abstraction).zip(selector).map(|(found, selector)| {
+        found.regions(selector.grid()).map(|region| {
+            Polygon::rectangle(Pose::default(), region).map(|v| frame.world_from_local_point(v))
+        })
+    });
+    let preparatory = guidance.and_then(|g| g.preparatory);
+    let drawing = Drawing {
+        method: Some(method.name()),
+        path: path.as_ref(),
+        regions,
+        preparatory: preparatory.map(|p| frame.world_from_local(p)),
+        note: Some(episode.row.reason.as_str()).filter(|r| !r.is_empty()),
+    };
+    scene_svg(scene, &drawing)
+}

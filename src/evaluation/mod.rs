@@ -1,3 +1,28 @@
-//! evaluation
+//! Evaluation: every method on the same scenes, one row each, tables and reports.
+//!
+//! Reading order: a [`Method`] is built from [`Models`]; [`episode`] runs one method on
+//! one scene, exports the path ([`export`]) and has it checked by the independent
+//! [`oracle`]; [`suite`] does so for all; [`rows`] are saved; [`metrics`] summarises them,
+//! [`table`] lays them out beside the paper's, [`report`] writes them down. [`draw`] makes
+//! pictures of scenes and paths.
 
 pub mod draw;
+pub mod episode;
+pub mod export;
+mod method;
+pub mod metrics;
+mod models;
+pub mod oracle;
+mod outputs;
+pub mod report;
+pub mod rows;
+pub mod suite;
+pub mod table;
+
+pub use episode::{Case, Episode, EpisodeConfig};
+pub use export::{PathFile, PathFileError};
+pub use method::{Method, MethodError};
+pub use models::{Models, ModelsError};
+pub use outputs::{OutputError, Outputs};
+pub use rows::Row;
+pub use suite::{SuiteConfig, SuiteError};

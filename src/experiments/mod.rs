@@ -1,1 +1,10 @@
-//! experiments
+//! Experiments: the whole loop (collect, train, evaluate, report) from one versioned file.
+//!
+//! [`config`] is that file, `experiments/NAME.toml`; [`runner`] does what it says, stage by
+//! stage, and compares a rerun with the committed rows.
+
+pub mod config;
+pub mod runner;
+
+pub use config::{ConfigError, ExperimentConfig};
+pub use runner::ExperimentError;

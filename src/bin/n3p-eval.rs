@@ -1,0 +1,122 @@
+//! Every method on the same scenes: rows, tables beside the paper's, a report.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::Parser;
+use n3p::cli::{self, OrBadInput};
+use n3p::evaluation::report::{self, Provenance};
+use n3p::evaluation::suite::{self, SuiteConfig};
+use n3p::evaluation::{Case, Method, Models, Outputs, metrics};
+use n3p::planners::HybridAStarConfig;
+use n3p::world::{Level, ParkingType};
+
+/// Evaluates planning methods on generated scenes, or on a folder of scene files.
+#[derive(Parser)]
+#[command(version)]
+struct Args {
+    /// A trained model; may be given several times. Bare names are looked for in the
+    /// working folder, then in models/.
+    #[arg(long = "model", value_name = "FILE")]
+    models: Vec<String>,
+    /// Parking type [default: all that the models know].
+    #[arg(long = "type", value_enum, value_name = "TYPE")]
+    kind: Option<ParkingType>,
+    /// Difficulty of the generated scenes [default: all].
+    #[arg(long, value_enum, conflicts_with = "scenes")]
+    level: Option<Level>,
+    /// Methods, separated by commas [default: ha-rs and all that the models allow].
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    methods: Vec<Method>,
+    /// Generated scenes per type and level.
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
+    count: u32,
+    /// Seed of the generated scenes and of the intervals.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Evaluate the scene files of this folder instead of generated scenes.
+    #[arg(long, value_name = "DIR", conflicts_with = "count")]
+    scenes: Option<PathBuf>,
+    /// Write each path to DIR/SCENE.METHOD.json.
+    #[arg(long, value_name = "DIR")]
+    paths: Option<PathBuf>,
+    /// Write rows.csv, rows.parquet and report.md to this folder.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print rows and summaries as JSON instead of tables.
+    #[arg(long)]
+    json: bool,
+    /// Expansion budget per scene and method.
+    #[arg(long, default_value_t = 200_000, value_name = "N")]
+    max_expansions: usize,
+    /// Worker threads; more than one disturbs the times, never the results.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    threads: u16,
+}
+
+fn main() -> ExitCode {
+    cli::run(|| evaluate(&Args::parse()))
+}
+
+fn evaluate(args: &Args) -> Result<ExitCode> {
+    let models = Models::load(&args.models).or_bad_input()?;
+    let config = SuiteConfig {
+        methods: match &args.methods[..] {
+            [] => Method::available(&models),
+            given => given.to_vec(),
+        },
+        planner: HybridAStarConfig::default(),
+        max_expansions: args.max_expansions,
+        threads: args.threads.into(),
+    };
+    config.build_all(&models).or_bad_input()?;
+    let (cases, scenes) = cases(args, &config.methods, &models)?;
+    suite::check(&cases, &models, &config).or_bad_input()?;
+    let mut outputs = Outputs::create(args.out.as_deref(), args.paths.as_deref()).or_bad_input()?;
+
+    let bar = cli::progress((cases.len() * config.methods.len()) as u64, "evaluate");
+    let rows = suite::run(&cases, &models, &config, 0, |case, episode| {
+        bar.set_message(format!("{} {}", episode.row.method, episode.row.scene));
+        bar.inc(1);
+        outputs.take(case, episode).map_err(anyhow::Error::from)
+    })?;
+    bar.finish_and_clear();
+
+    let provenance = Provenance::here(scenes, args.seed, args.max_expansions, args.threads.into());
+    outputs.finish("Evaluation", &rows, &provenance)?;
+    if args.json {
+        let groups = metrics::summarise(&rows, args.seed);
+        let all = serde_json::json!({"provenance": provenance, "rows": rows, "groups": groups});
+        println!("{all:#}");
+    } else {
+        print!("{}", report::text(&rows, args.seed));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The scenes, and what to call them in the report.
+fn cases(args: &Args, methods: &[Method], models: &Models) -> Result<(Vec<Case>, String)> {
+    if let Some(dir) = &args.scenes {
+        let cases = suite::from_folder(dir, args.kind).or_bad_input()?;
+        let title = format!("{} from {}", cases.len(), dir.display());
+        return Ok((cases, title));
+    }
+    // Without --type: all that the models of the chosen methods know.
+    let known = |k: &ParkingType| methods.iter().all(|m| models.check_kind(*m, *k).is_ok());
+    let kinds = match args.kind {
+        Some(kind) => vec![kind],
+        None => ParkingType::ALL.into_iter().filter(known).collect(),
+    };
+    let levels = args.level.map_or(Level::ALL.to_vec(), |l| vec![l]);
+    let vehicle = models.vehicle().unwrap_or_default();
+    let cases = suite::generated(&vehicle, &kinds, &levels, args.count as usize, args.seed)
+        .or_bad_input()?;
+    let title = format!(
+        "{} generated, {} of each type and level, seed {}",
+        cases.len(),
+        args.count,
+        args.seed
+    );
+    Ok((cases, title))
+}

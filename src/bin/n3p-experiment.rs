@@ -1,0 +1,121 @@
+//! Experiments: the whole pipeline from one versioned file.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::{Parser, Subcommand};
+use n3p::cli::{self, BadInput, OrBadInput};
+use n3p::evaluation::{report, rows};
+use n3p::experiments::{ExperimentConfig, ExperimentError, runner};
+use n3p::training;
+
+/// Runs experiments: collect, train, evaluate and report, all from one file.
+#[derive(Parser)]
+#[command(version)]
+struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Runs an experiment, or goes on where an interrupted run stopped.
+    Run {
+        /// The experiment, such as experiments/quick.toml.
+        file: PathBuf,
+        /// Folder of the results [default: results/NAME beside the file].
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
+    /// Runs an experiment anew and compares its rows with the ones on record; everything
+    /// but times must agree. Exit code 1 if not.
+    Reproduce {
+        /// The experiment.
+        file: PathBuf,
+        /// Folder of the new results [default: a temporary one].
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
+    /// Lists the experiments of a folder.
+    List {
+        /// The folder.
+        #[arg(default_value = "experiments")]
+        folder: PathBuf,
+    },
+}
+
+/// Differences printed in full.
+const SHOWN: usize = 20;
+
+fn main() -> ExitCode {
+    training::single_threaded();
+    let args = Args::parse();
+    cli::run(|| match &args.command {
+        Command::Run { file, out } => run(file, out.as_deref()),
+        Command::Reproduce { file, out } => reproduce(file, out.as_deref()),
+        Command::List { folder } => list(folder),
+    })
+}
+
+fn run(file: &Path, out: Option<&Path>) -> Result<ExitCode> {
+    let config = ExperimentConfig::read(file).or_bad_input()?;
+    let out = out.map_or_else(|| results(file, &config), Path::to_owned);
+    let rows = runner::run(&config, &out).map_err(exit_code)?;
+    print!("{}", report::text(&rows, config.evaluate.seed));
+    println!("{}: config, data set, models, rows and report.md", out.display());
+    Ok(ExitCode::SUCCESS)
+}
+
+fn reproduce(file: &Path, out: Option<&Path>) -> Result<ExitCode> {
+    let config = ExperimentConfig::read(file).or_bad_input()?;
+    let recorded = results(file, &config).join("rows.csv");
+    if !recorded.exists() {
+        let text = format!(
+            "{}: no rows on record to compare with; make some: n3p-experiment run {}",
+            recorded.display(),
+            file.display()
+        );
+        return Err(BadInput(text).into());
+    }
+    let expected = rows::read_csv(&recorded).or_bad_input()?;
+    let temporary = tempfile::tempdir()?;
+    let found = runner::run(&config, out.unwrap_or(temporary.path())).map_err(exit_code)?;
+    let lines = runner::differences(&expected, &found);
+    if lines.is_empty() {
+        println!("{} rows agree with {}", found.len(), recorded.display());
+        return Ok(ExitCode::SUCCESS);
+    }
+    for line in lines.iter().take(SHOWN) {
+        println!("{line}");
+    }
+    println!("{} differences from {}", lines.len(), recorded.display());
+    Ok(ExitCode::FAILURE)
+}
+
+fn list(folder: &Path) -> Result<ExitCode> {
+    let cannot = |e| BadInput(format!("{}: {e}; give a folder of experiments", folder.display()));
+    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
+        .map_err(cannot)?
+        .map(|entry| entry.map(|e| e.path()))
+        .collect::<std::io::Result<_>>()
+        .map_err(cannot)?;
+    files.retain(|f| f.extension().is_some_and(|e| e == "toml"));
+    files.sort();
+    for file in files {
+        match ExperimentConfig::read(&file) {
+            Ok(config) => println!("{}: {}", file.display(), config.description),
+            Err(error) => println!("{error}"),
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// `results/NAME` beside the experiment's file.
+fn results(file: &Path, config: &ExperimentConfig) -> PathBuf {
+    file.parent().unwrap_or(Path::new("")).join("results").join(&config.name)
+}
+
+fn exit_code(error: ExperimentError) -> anyhow::Error {
+    if error.is_bad_input() { BadInput(error.to_string()).into() } else { error.into() }
+}

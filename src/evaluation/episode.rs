@@ -1,0 +1,160 @@
+//! One episode: one method on one scene, timed and checked.
+
+use std::time::Instant;
+
+use super::export::PathFile;
+use super::oracle;
+use super::rows::Row;
+use crate::planners::{Budget, PlanResult, Planner, Problem, ProblemError, Route};
+use crate::world::{Level, ParkingType, Scene};
+
+/// A scene to evaluate, and how it is labelled.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// The scene; its name is unique in a run.
+    pub scene: Scene,
+    /// Parking type, where known.
+    pub kind: Option<ParkingType>,
+    /// Difficulty, for generated scenes.
+    pub level: Option<Level>,
+}
+
+/// How episodes are run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EpisodeConfig {
+    /// Expansion budget.
+    pub budget: Budget,
+    /// At most so many timed runs after the first.
+    pub repeats: usize,
+    /// No further run begins once the runs so far took this long together, seconds.
+    pub repeat_within_s: f64,
+}
+
+impl EpisodeConfig {
+    /// The usual timing with `max_expansions`.
+    pub fn new(max_expansions: usize) -> Self {
+        Self { budget: Budget { max_expansions }, repeats: 5, repeat_within_s: 0.05 }
+    }
+}
+
+/// What an episode leaves.
+#[derive(Clone, Debug)]
+pub struct Episode {
+    /// The row.
+    pub row: Row,
+    /// The problem as the planner saw it.
+    pub problem: Problem,
+    /// What the planner returned.
+    pub result: PlanResult,
+    /// The path in the scene's frame, if there is one.
+    pub path: Option<PathFile>,
+}
+
+/// The reason in rows whose path the independent check refuses.
+pub const REJECTED: &str = "rejected by the independent check";
+/// The reason in rows of planners that do not repeat their own result.
+pub const UNREPEATABLE: &str = "two runs gave different results";
+
+/// Runs `planner` on `case`, checks its path and makes the row.
+///
+/// A run is timed from the scene's obstacles in hand to the certified path. The first run
+/// warms caches up: where it is cheap it is thrown away, and the time is the median of
+/// the runs after it. A first run beyond `repeat_within_s` counts itself.
+pub fn run(
+    case: &Case,
+    planner: &mut dyn Planner,
+    config: &EpisodeConfig,
+) -> Result<Episode, ProblemError> {
+    let (problem, result, first_s) = timed(&case.scene, planner, config.budget)?;
+    let mut times = Vec::new();
+    let mut total_s = first_s;
+    let mut repeatable = true;
+    while total_s < config.repeat_within_s && times.len() < config.repeats {
+        let (_, again, seconds) = timed(&case.scene, planner, config.budget)?;
+        repeatable &= again.outcome == result.outcome && again.expansions == result.expansions;
+        times.push(seconds);
+        total_s += seconds;
+    }
+    if times.is_empty() {
+        times.push(first_s);
+    }
+    times.sort_by(f64::total_cmp);
+    let mut row = blank_row(case, planner.name(), times[times.len() / 2]);
+    let path = describe(case, &problem, &result, &mut row);
+    if !repeatable {
+        row.ok = false;
+        row.reason = UNREPEATABLE.to_owned();
+    }
+    Ok(Episode { row, problem, result, path })
+}
+
+fn timed(
+    scene: &Scene,
+    planner: &mut dyn Planner,
+    budget: Budget,
+) -> Result<(Problem, PlanResult, f64), ProblemError> {
+    let start = Instant::now();
+    let problem = Problem::new(scene)?;
+    let result = planner.plan(&problem, budget);
+    Ok((problem, result, start.elapsed().as_secs_f64()))
+}
+
+fn blank_row(case: &Case, method: &str, plan_time_s: f64) -> Row {
+    Row {
+        scene: case.scene.name.clone(),
+        kind: case.kind,
+        level: case.level,
+        method: method.to_owned(),
+        ok: false,
+        reason: String::new(),
+        plan_time_s,
+        length_m: None,
+        direction_changes: None,
+        max_abs_steer_rad: None,
+        mean_abs_steer_change_rad: None,
+        nodes: 0,
+        min_clearance_m: None,
+        fallback: false,
+        checked: String::new(),
+        route: String::new(),
+    }
+}
+
+/// Fills `row` from the result; returns the exported path, if any.
+fn describe(
+    case: &Case,
+    problem: &Problem,
+    result: &PlanResult,
+    row: &mut Row,
+) -> Option<PathFile> {
+    row.nodes = result.expansions as u32;
+    if let Some(guidance) = &result.guidance {
+        row.fallback = guidance.route == Route::Fallback;
+        row.route = guidance.route.name().to_owned();
+    }
+    let path = match &result.outcome {
+        Ok(path) => path,
+        Err(reason) => {
+            row.reason = reason.to_string();
+            return None;
+        }
+    };
+    let vehicle = &problem.vehicle;
+    row.length_m = Some(path.length());
+    row.direction_changes = Some(path.direction_changes() as u32);
+    row.max_abs_steer_rad = Some(vehicle.steer(path.max_abs_curvature()));
+    row.mean_abs_steer_change_rad = Some(path.mean_abs_steer_change(vehicle));
+    let file = PathFile::new(&case.scene, &problem.frame, path, &row.method);
+    match oracle::check(&case.scene, &file) {
+        Ok(clearance) => {
+            row.ok = true;
+            row.min_clearance_m = Some(clearance).filter(|c| c.is_finite());
+            row.checked = "ok".to_owned();
+        }
+        Err(violation) => {
+            row.reason = REJECTED.to_owned();
+            row.checked = violation.to_string();
+        }
+    }
+    Some(file)
+}

@@ -1,0 +1,151 @@
+//! Path files: a plan as plain numbers in the scene's own frame.
+//!
+//! `SCENE.METHOD.json` holds `{"poses": [[x, y, θ], …], "gears": [1 | -1, …],
+//! "steer": [rad, …], "method": …}`: three arrays of one length. Gear and steering
+//! angle belong to the motion that *follows* a pose; the last pose repeats those of the
+//! motion that led there.
+
+use std::path::{Path as FilePath, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::curves::Path;
+use crate::dataset::write::write_atomically;
+use crate::geometry::{Frame, Pose, signed_angle};
+use crate::world::Scene;
+
+/// A planned path, as exported.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PathFile {
+    /// Rear-axle poses `[x, y, θ]` in the scene's frame, metres and radians.
+    pub poses: Vec<[f64; 3]>,
+    /// +1 forward, −1 backward.
+    pub gears: Vec<i8>,
+    /// Angle of the front wheels, radians, positive to the left.
+    pub steer: Vec<f64>,
+    /// The method that planned it.
+    pub method: String,
+}
+
+/// A path file that cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum PathFileError {
+    /// Reading or writing failed.
+    #[error("{path}: {error}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The operating system's reason.
+        error: std::io::Error,
+    },
+    /// The contents are not a path.
+    #[error("{path}: {message}")]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong and what would be right.
+        message: String,
+    },
+}
+
+impl PathFile {
+    /// Distance between exported poses, metres; at most.
+    pub const STEP: f64 = 0.05;
+    /// Ends this near to the scene's own (metres and radians) are written as those.
+    const SNAP: f64 = 1e-6;
+
+    /// The export of `path`, planned in `frame` for `scene`.
+    pub fn new(scene: &Scene, frame: &Frame, path: &Path, method: &str) -> Self {
+        let samples = path.to_world(frame).sample(Self::STEP);
+        let mut poses: Vec<[f64; 3]> = samples.iter().map(|s| s.pose.into()).collect();
+        if let Some(first) = poses.first_mut() {
+            snap(first, scene.start);
+        }
+        if let Some(last) = poses.last_mut() {
+            snap(last, scene.goal);
+        }
+        Self {
+            poses,
+            gears: samples.iter().map(|s| s.gear.sign() as i8).collect(),
+            steer: samples.iter().map(|s| scene.vehicle.steer(s.curvature)).collect(),
+            method: method.to_owned(),
+        }
+    }
+
+    /// `SCENE.METHOD.json`.
+    pub fn file_name(scene: &Scene, method: &str) -> String {
+        format!("{}.{method}.json", scene.file_stem())
+    }
+
+    /// Reads a path file and checks that its arrays fit together.
+    pub fn read(file: &FilePath) -> Result<Self, PathFileError> {
+        let format = |message| PathFileError::Format { path: file.to_owned(), message };
+        let text = std::fs::read_to_string(file)
+            .map_err(|error| PathFileError::Io { path: file.to_owned(), error })?;
+        let path: Self = serde_json::from_str(&text).map_err(|e| {
+            format(format!("not a path file: {e}; expected poses, gears, steer and method"))
+        })?;
+        let (poses, gears, steer) = (path.poses.len(), path.gears.len(), path.steer.len());
+        if poses == 0 || poses != gears || poses != steer {
+            return Err(format(format!(
+                "{poses} poses, {gears} gears, {steer} steer; expected equal numbers, at least 1"
+            )));
+        }
+        Ok(path)
+    }
+
+    /// Writes the file (to a temporary name, then renamed).
+    pub fn write(&self, file: &FilePath) -> Result<(), PathFileError> {
+        let json = serde_json::to_vec(self).expect("plain numbers and strings");
+        write_atomically(file, &json)
+            .map_err(|error| PathFileError::Io { path: file.to_owned(), error })
+    }
+}
+
+fn snap(pose: &mut [f64; 3], exact: Pose) {
+    let p = Pose::from(*pose);
+    let near = PathFile::SNAP;
+    if p.distance(exact) <= near && signed_angle(p.heading, exact.heading).abs() <= near {
+        *pose = exact.into();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::curves::Segment;
+    use crate::vehicle::Vehicle;
+
+    #[test]
+    fn ends_are_the_scenes_own_numbers() {
+        let frame = Frame { origin_in_world: Pose::new(5e5, -3e5, 2.0), mirrored: true };
+        let path = Path::new(
+            Pose::new(3.0, 4.0, 0.2),
+            [(0.2, 3.0), (0.0, -2.0)].map(|(curvature, length)| Segment { curvature, length }),
+        );
+        let mut start = frame.world_from_local(path.start);
+        start.heading += std::f64::consts::TAU;
+        let scene = Scene {
+            name: "s".into(),
+            source: String::new(),
+            vehicle: Vehicle::default(),
+            start,
+            goal: frame.world_from_local(path.end()),
+            parking_type: None,
+            obstacles: vec![],
+            points: vec![],
+            bounds: None,
+        };
+        let file = PathFile::new(&scene, &frame, &path, "ha-rs");
+        assert_eq!(file.poses[0], <[f64; 3]>::from(scene.start));
+        assert_eq!(*file.poses.last().unwrap(), <[f64; 3]>::from(scene.goal));
+        assert_eq!(file.poses.len(), 60 + 40 + 1);
+        assert!(file.steer[0] < 0.0, "a mirrored left turn is a right turn");
+        assert_eq!((file.gears[0], file.gears[100]), (1, -1));
+        let dir = tempfile::tempdir().unwrap();
+        let name = dir.path().join(PathFile::file_name(&scene, "ha-rs"));
+        file.write(&name).unwrap();
+        assert_eq!(PathFile::read(&name).unwrap(), file);
+    }
+}

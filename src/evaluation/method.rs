@@ -1,0 +1,208 @@
+//! The methods of the tables, by name.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use super::models::Models;
+use crate::planners::{HybridAStar, HybridAStarConfig, Planner};
+use crate::selectors::guided::GuidedPlanner;
+use crate::world::UnknownName;
+
+/// A row of the paper's tables, or our own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub enum Method {
+    /// Hybrid A* without Reeds-Shepp expansion.
+    Ha,
+    /// Hybrid A* with Reeds-Shepp expansion.
+    HaRs,
+    /// The best of the first five solutions of Hybrid A*.
+    HaHold,
+    /// Multi-heuristic A* over the hybrid lattice.
+    Mhha,
+    /// Hybrid A* to the end of a geometric exit manoeuvre (parallel only).
+    Sha,
+    /// A policy trained from nothing.
+    RlSimple,
+    /// The pretrained policy of the paper's baseline (HOPE).
+    RlEval,
+    /// The paper's N3P with a pose from the MLP.
+    MlpN3p,
+    /// The paper's N3P with a pose from KNN.
+    KnnN3p,
+    /// Our N3P: ranked candidates, no search where Reeds-Shepp curves suffice.
+    N3p,
+}
+
+/// A method that cannot be built.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MethodError {
+    /// It needs a model that was not given.
+    #[error(
+        "method {method} needs a trained {model} model: give --model FILE (such as --model \
+         {example}), or train one with `n3p-train {model} --type TYPE`"
+    )]
+    NoModel {
+        /// The method.
+        method: Method,
+        /// `knn` or `mlp`.
+        model: &'static str,
+        /// A file name to try.
+        example: &'static str,
+    },
+    /// It is planned, not written.
+    #[error("method {0} is not available in this version; available: {AVAILABLE}")]
+    NotAvailable(Method),
+}
+
+const AVAILABLE: &str = "ha-rs, mlp-n3p, knn-n3p, n3p";
+
+impl Method {
+    /// All methods, in the order of the paper's tables, ours last.
+    pub const ALL: [Method; 10] = [
+        Self::Ha,
+        Self::HaRs,
+        Self::HaHold,
+        Self::Mhha,
+        Self::Sha,
+        Self::RlSimple,
+        Self::RlEval,
+        Self::MlpN3p,
+        Self::KnnN3p,
+        Self::N3p,
+    ];
+
+    /// The name used in rows, files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ha => "ha",
+            Self::HaRs => "ha-rs",
+            Self::HaHold => "ha-hold",
+            Self::Mhha => "mhha",
+            Self::Sha => "sha",
+            Self::RlSimple => "rl-simple",
+            Self::RlEval => "rl-eval",
+            Self::MlpN3p => "mlp-n3p",
+            Self::KnnN3p => "knn-n3p",
+            Self::N3p => "n3p",
+        }
+    }
+
+    /// The name in the paper's tables; `None` for our own rows.
+    pub fn paper_name(self) -> Option<&'static str> {
+        match self {
+            Self::Ha => Some("HA*"),
+            Self::HaRs => Some("HA* with RS"),
+            Self::HaHold => Some("HA* Hold"),
+            Self::Mhha => Some("MHHA*"),
+            Self::Sha => Some("SHA*"),
+            Self::RlSimple => Some("RL Simple"),
+            Self::RlEval => Some("RL Eval"),
+            Self::MlpN3p => Some("MLP-N3P"),
+            Self::KnnN3p => Some("KNN-N3P"),
+            Self::N3p => None,
+        }
+    }
+
+    /// Whether it searches a graph and learns nothing: the rows that speed-ups refer to.
+    pub fn is_graph_search(self) -> bool {
+        matches!(self, Self::Ha | Self::HaRs | Self::HaHold | Self::Mhha | Self::Sha)
+    }
+
+    /// Whether it needs a trained model, which is bound to one vehicle.
+    pub fn needs_model(self) -> bool {
+        matches!(self, Self::MlpN3p | Self::KnnN3p | Self::N3p)
+    }
+
+    /// Every method that can be built from `models`.
+    pub fn available(models: &Models) -> Vec<Method> {
+        let config = HybridAStarConfig::default();
+        Self::ALL.into_iter().filter(|m| m.build(models, &config).is_ok()).collect()
+    }
+
+    /// The planner of this method.
+    pub fn build(
+        self,
+        models: &Models,
+        config: &HybridAStarConfig,
+    ) -> Result<Box<dyn Planner + Send>, MethodError> {
+        let no_model = |model, example| MethodError::NoModel { method: self, model, example };
+        let selector = models.selector(self);
+        match self {
+            Self::HaRs => Ok(Box::new(HybridAStar::new(*config))),
+            Self::KnnN3p => {
+                let selector = selector.ok_or_else(|| no_model("knn", "knn.bin"))?;
+                Ok(Box::new(GuidedPlanner::paper(self.name(), selector, *config)))
+            }
+            Self::MlpN3p => {
+                let selector = selector.ok_or_else(|| no_model("mlp", "mlp-TYPE.safetensors"))?;
+                Ok(Box::new(GuidedPlanner::paper(self.name(), selector, *config)))
+            }
+            Self::N3p => {
+                let selector = selector.ok_or_else(|| no_model("knn", "knn.bin"))?;
+                Ok(Box::new(GuidedPlanner::ranked(self.name(), selector, *config)))
+            }
+            Self::Ha | Self::HaHold | Self::Mhha | Self::Sha | Self::RlSimple | Self::RlEval => {
+                Err(MethodError::NotAvailable(self))
+            }
+        }
+    }
+}
+
+impl FromStr for Method {
+    type Err = UnknownName;
+
+    fn from_str(name: &str) -> Result<Self, UnknownName> {
+        Self::ALL.into_iter().find(|m| m.name() == name).ok_or_else(|| UnknownName {
+            what: "method",
+            name: name.to_owned(),
+            expected: "ha, ha-rs, ha-hold, mhha, sha, rl-simple, rl-eval, mlp-n3p, knn-n3p, n3p",
+        })
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl TryFrom<String> for Method {
+    type Error = UnknownName;
+
+    fn try_from(name: String) -> Result<Self, UnknownName> {
+        name.parse()
+    }
+}
+
+impl From<Method> for String {
+    fn from(method: Method) -> String {
+        method.name().to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_go_round_and_unknown_ones_list_all() {
+        for m in Method::ALL {
+            assert_eq!(m.name().parse(), Ok(m));
+        }
+        let message = "a-star".parse::<Method>().unwrap_err().to_string();
+        assert!(Method::ALL.iter().all(|m| message.contains(m.name())), "{message}");
+    }
+
+    #[test]
+    fn without_a_model_the_error_says_what_to_do() {
+        let build = |m: Method| m.build(&Models::default(), &HybridAStarConfig::default());
+        let message = build(Method::N3p).err().unwrap().to_string();
+        assert!(message.contains("--model") && message.contains("n3p-train knn"), "{message}");
+        let message = build(Method::Sha).err().unwrap().to_string();
+        assert!(message.contains("not available in this version"), "{message}");
+        assert_eq!(Method::available(&Models::default()), [Method::HaRs]);
+    }
+}

@@ -1,0 +1,345 @@
+//! Rows: one per (scene, method), the record every table is made of.
+//!
+//! [`RowWriter`] appends to `rows.csv` as rows come and flushes each, so that an
+//! interrupted run keeps what it did; [`write_parquet`] adds `rows.parquet` at the end.
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use arrow_array::{ArrayRef, BooleanArray, Float64Array, RecordBatch, StringArray, UInt32Array};
+use parquet::arrow::ArrowWriter;
+use serde::{Deserialize, Serialize};
+
+use crate::dataset::write::write_atomically;
+use crate::world::{Level, ParkingType};
+
+/// The result of one method on one scene. Columns that describe a path are empty where
+/// there is none.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Name of the scene.
+    pub scene: String,
+    /// Its parking type, where known.
+    #[serde(rename = "type")]
+    pub kind: Option<ParkingType>,
+    /// Its difficulty, for generated scenes.
+    pub level: Option<Level>,
+    /// Name of the method.
+    pub method: String,
+    /// Whether there is a path and the independent check accepts it.
+    pub ok: bool,
+    /// Why not; empty when `ok`.
+    pub reason: String,
+    /// From the obstacle points in hand to the certified path, seconds.
+    pub plan_time_s: f64,
+    /// Driven length, metres.
+    pub length_m: Option<f64>,
+    /// Gear changes along the way.
+    pub direction_changes: Option<u32>,
+    /// Largest |δ|, radians.
+    pub max_abs_steer_rad: Option<f64>,
+    /// Mean |δ(t + 0.1 s) − δ(t)|, radians.
+    pub mean_abs_steer_change_rad: Option<f64>,
+    /// Node expansions.
+    pub nodes: u32,
+    /// Smallest distance to an obstacle, metres; empty without obstacles too.
+    pub min_clearance_m: Option<f64>,
+    /// Whether a guided planner had to search the whole way after all.
+    pub fallback: bool,
+    /// Verdict of the independent check: `ok`, the violation, or empty without a path.
+    pub checked: String,
+    /// How a guided planner came to its path: `direct`, `searched`, `fallback`.
+    pub route: String,
+}
+
+impl Row {
+    /// Names of the columns, in order.
+    pub const COLUMNS: [&'static str; 16] = [
+        "scene",
+        "type",
+        "level",
+        "method",
+        "ok",
+        "reason",
+        "plan_time_s",
+        "length_m",
+        "direction_changes",
+        "max_abs_steer_rad",
+        "mean_abs_steer_change_rad",
+        "nodes",
+        "min_clearance_m",
+        "fallback",
+        "checked",
+        "route",
+    ];
+
+    /// Scene and method, which no two rows of a run share.
+    pub fn key(&self) -> (&str, &str) {
+        (&self.scene, &self.method)
+    }
+
+    /// This row without its time: what must be the same in every run.
+    pub fn untimed(&self) -> Row {
+        Row { plan_time_s: 0.0, ..self.clone() }
+    }
+
+    /// The values as text, in the order of [`Row::COLUMNS`].
+    pub fn fields(&self) -> [String; 16] {
+        fn text<T: ToString>(v: &Option<T>) -> String {
+            v.as_ref().map(T::to_string).unwrap_or_default()
+        }
+        [
+            self.scene.clone(),
+            text(&self.kind),
+            text(&self.level),
+            self.method.clone(),
+            self.ok.to_string(),
+            self.reason.clone(),
+            self.plan_time_s.to_string(),
+            text(&self.length_m),
+            text(&self.direction_changes),
+            text(&self.max_abs_steer_rad),
+            text(&self.mean_abs_steer_change_rad),
+            self.nodes.to_string(),
+            text(&self.min_clearance_m),
+            self.fallback.to_string(),
+            self.checked.clone(),
+            self.route.clone(),
+        ]
+    }
+
+    /// The row as one line of CSV, line break included.
+    pub fn to_csv(&self) -> String {
+        self.fields().map(|f| quoted(&f)).join(",") + "\n"
+    }
+
+    fn from_fields(f: &[String]) -> Result<Row, String> {
+        if f.len() != Self::COLUMNS.len() {
+            return Err(format!("has {} columns; expected {}", f.len(), Self::COLUMNS.len()));
+        }
+        fn parse<T: std::str::FromStr>(f: &[String], i: usize) -> Result<T, String> {
+            f[i].parse().map_err(|_| format!("{} is \"{}\"", Row::COLUMNS[i], f[i]))
+        }
+        fn maybe<T: std::str::FromStr>(f: &[String], i: usize) -> Result<Option<T>, String> {
+            if f[i].is_empty() { Ok(None) } else { parse(f, i).map(Some) }
+        }
+        Ok(Row {
+            scene: f[0].clone(),
+            kind: maybe(f, 1)?,
+            level: maybe(f, 2)?,
+            method: f[3].clone(),
+            ok: parse(f, 4)?,
+            reason: f[5].clone(),
+            plan_time_s: parse(f, 6)?,
+            length_m: maybe(f, 7)?,
+            direction_changes: maybe(f, 8)?,
+            max_abs_steer_rad: maybe(f, 9)?,
+            mean_abs_steer_change_rad: maybe(f, 10)?,
+            nodes: parse(f, 11)?,
+            min_clearance_m: maybe(f, 12)?,
+            fallback: parse(f, 13)?,
+            checked: f[14].clone(),
+            route: f[15].clone(),
+        })
+    }
+}
+
+/// Rows that cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum RowsError {
+    /// Reading or writing failed.
+    #[error("{path}: {error}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The operating system's reason.
+        error: io::Error,
+    },
+    /// A line is not a row.
+    #[error("{path}: line {line}: {message}")]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// Counted from 1.
+        line: usize,
+        /// What is wrong.
+        message: String,
+    },
+    /// The Parquet writer failed.
+    #[error("{path}: {error}")]
+    Parquet {
+        /// The file.
+        path: PathBuf,
+        /// The library's reason.
+        error: parquet::errors::ParquetError,
+    },
+}
+
+/// Appends rows to a CSV file, each flushed at once.
+pub struct RowWriter {
+    path: PathBuf,
+    file: File,
+}
+
+impl RowWriter {
+    /// Begins `path` anew with the header line.
+    pub fn create(path: &Path) -> Result<Self, RowsError> {
+        let io = |error| RowsError::Io { path: path.to_owned(), error };
+        let mut file = File::create(path).map_err(io)?;
+        file.write_all((Row::COLUMNS.join(",") + "\n").as_bytes()).map_err(io)?;
+        Ok(Self { path: path.to_owned(), file })
+    }
+
+    /// Appends one row.
+    pub fn push(&mut self, row: &Row) -> Result<(), RowsError> {
+        // One unbuffered write: nothing waits in this process.
+        self.file
+            .write_all(row.to_csv().as_bytes())
+            .map_err(|error| RowsError::Io { path: self.path.clone(), error })
+    }
+}
+
+/// Reads a `rows.csv`. A last line without line break (an interrupted run) is left out.
+pub fn read_csv(path: &Path) -> Result<Vec<Row>, RowsError> {
+    let text = std::fs::read_to_string(path)
+        .map_err(|error| RowsError::Io { path: path.to_owned(), error })?;
+    let complete = text.rfind('\n').map_or("", |end| &text[..=end]);
+    let mut rows = Vec::new();
+    for (i, line) in complete.lines().enumerate() {
+        let format = |message| RowsError::Format { path: path.to_owned(), line: i + 1, message };
+        if i == 0 {
+            if line != Row::COLUMNS.join(",") {
+                return Err(format("expected the header of a rows.csv".to_owned()));
+            }
+            continue;
+        }
+        rows.push(Row::from_fields(&split(line)).map_err(format)?);
+    }
+    Ok(rows)
+}
+
+/// Writes the rows as Parquet, to a temporary name first.
+pub fn write_parquet(path: &Path, rows: &[Row]) -> Result<(), RowsError> {
+    let parquet = |error| RowsError::Parquet { path: path.to_owned(), error };
+    let text = |f: fn(&Row) -> Option<String>| -> ArrayRef {
+        Arc::new(rows.iter().map(f).collect::<StringArray>())
+    };
+    let number = |f: fn(&Row) -> Option<f64>| -> ArrayRef {
+        Arc::new(rows.iter().map(f).collect::<Float64Array>())
+    };
+    let count = |f: fn(&Row) -> Option<u32>| -> ArrayRef {
+        Arc::new(rows.iter().map(f).collect::<UInt32Array>())
+    };
+    let flag = |f: fn(&Row) -> Option<bool>| -> ArrayRef {
+        Arc::new(rows.iter().map(f).collect::<BooleanArray>())
+    };
+    let columns = [
+        text(|r| Some(r.scene.clone())),
+        text(|r| r.kind.map(|k| k.to_string())),
+        text(|r| r.level.map(|l| l.to_string())),
+        text(|r| Some(r.method.clone())),
+        flag(|r| Some(r.ok)),
+        text(|r| Some(r.reason.clone())),
+        number(|r| Some(r.plan_time_s)),
+        number(|r| r.length_m),
+        count(|r| r.direction_changes),
+        number(|r| r.max_abs_steer_rad),
+        number(|r| r.mean_abs_steer_change_rad),
+        count(|r| Some(r.nodes)),
+        number(|r| r.min_clearance_m),
+        flag(|r| Some(r.fallback)),
+        text(|r| Some(r.checked.clone())),
+        text(|r| Some(r.route.clone())),
+    ];
+    let named = Row::COLUMNS.into_iter().zip(columns).map(|(name, column)| (name, column, true));
+    let batch = RecordBatch::try_from_iter_with_nullable(named)
+        .expect("columns of one length and one type each");
+    let mut bytes = Vec::new();
+    let mut writer = ArrowWriter::try_new(&mut bytes, batch.schema(), None).map_err(parquet)?;
+    writer.write(&batch).map_err(parquet)?;
+    writer.close().map_err(parquet)?;
+    write_atomically(path, &bytes).map_err(|error| RowsError::Io { path: path.to_owned(), error })
+}
+
+fn quoted(field: &str) -> String {
+    if field.contains([',', '"', '\n']) {
+        format!("\"{}\"", field.replace('"', "\"\"").replace('\n', " "))
+    } else {
+        field.to_owned()
+    }
+}
+
+/// The fields of one CSV line.
+fn split(line: &str) -> Vec<String> {
+    let mut fields = vec![String::new()];
+    let mut quoted = false;
+    let mut chars = line.chars().peekable();
+    while let Some(c) = chars.next() {
+        let field = fields.last_mut().expect("never empty");
+        match c {
+            '"' if quoted && chars.peek() == Some(&'"') => {
+                chars.next();
+                field.push('"');
+            }
+            '"' => quoted = !quoted,
+            ',' if !quoted => fields.push(String::new()),
+            c => field.push(c),
+        }
+    }
+    fields
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row() -> Row {
+        Row {
+            scene: "a, \"b\"".into(),
+            kind: Some(ParkingType::Parallel),
+            level: None,
+            method: "ha-rs".into(),
+            ok: false,
+            reason: "rejected by the independent check".into(),
+            plan_time_s: 0.1 + 0.2,
+            length_m: Some(1.0 / 3.0),
+            direction_changes: Some(2),
+            max_abs_steer_rad: None,
+            mean_abs_steer_change_rad: Some(1e-17),
+            nodes: 7,
+            min_clearance_m: None,
+            fallback: true,
+            checked: "pose 3: moves against gear 1".into(),
+            route: "fallback".into(),
+        }
+    }
+
+    #[test]
+    fn csv_round_trip_is_exact_and_drops_half_a_line() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("rows.csv");
+        let mut writer = RowWriter::create(&path).unwrap();
+        writer.push(&row()).unwrap();
+        writer.push(&row()).unwrap();
+        assert_eq!(read_csv(&path).unwrap(), vec![row(), row()]);
+        let bytes = std::fs::read(&path).unwrap();
+        std::fs::write(&path, &bytes[..bytes.len() - 5]).unwrap();
+        assert_eq!(read_csv(&path).unwrap(), vec![row()]);
+    }
+
+    #[test]
+    fn parquet_holds_every_row() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("rows.parquet");
+        write_parquet(&path, &[row(), row(), row()]).unwrap();
+        let reader = parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder::try_new(
+            File::open(&path).unwrap(),
+        )
+        .unwrap();
+        assert_eq!(reader.metadata().file_metadata().num_rows(), 3);
+        let names: Vec<_> = reader.schema().fields().iter().map(|f| f.name().clone()).collect();
+        assert_eq!(names, Row::COLUMNS);
+    }
+}

@@ -1,0 +1,181 @@
+//! Many episodes: every method on every scene, in a fixed order whatever the threads.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc;
+
+use super::episode::{self, Case, Episode, EpisodeConfig};
+use super::method::{Method, MethodError};
+use super::models::{Models, ModelsError};
+use super::rows::Row;
+use crate::planners::{HybridAStarConfig, Planner, Problem, ProblemError};
+use crate::vehicle::Vehicle;
+use crate::world::generate::{GeneratorConfig, GeneratorError, generate};
+use crate::world::scene::SceneError;
+use crate::world::{Level, ParkingType, Scene};
+
+/// What to run on the scenes.
+#[derive(Clone, Debug)]
+pub struct SuiteConfig {
+    /// The methods, in the order of the rows.
+    pub methods: Vec<Method>,
+    /// Settings of every search.
+    pub planner: HybridAStarConfig,
+    /// Expansion budget per episode.
+    pub max_expansions: usize,
+    /// Worker threads. More than one disturbs the times, never the results.
+    pub threads: usize,
+}
+
+/// A suite that cannot run.
+#[derive(Debug, thiserror::Error)]
+pub enum SuiteError {
+    /// A scene cannot be read.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// There is nothing to evaluate.
+    #[error("{0}")]
+    NoScenes(String),
+    /// Two scenes share a name, so their rows could not be told apart.
+    #[error("scene name \"{0}\" occurs twice; give every scene a name of its own")]
+    SameName(String),
+    /// A scene has no solution by its own data.
+    #[error("scene {scene}: {error}; move it, or leave this scene out")]
+    Unsolvable {
+        /// Name of the scene.
+        scene: String,
+        /// What is wrong with it.
+        error: ProblemError,
+    },
+    /// A method cannot be built.
+    #[error(transparent)]
+    Method(#[from] MethodError),
+    /// No scenes can be generated for the vehicle.
+    #[error("no scenes for this vehicle: {0}")]
+    Generator(#[from] GeneratorError),
+    /// A model does not fit.
+    #[error(transparent)]
+    Models(#[from] ModelsError),
+}
+
+/// Generated scenes: `count` of each type and level, a function of the seed alone.
+pub fn generated(
+    vehicle: &Vehicle,
+    kinds: &[ParkingType],
+    levels: &[Level],
+    count: usize,
+    seed: u64,
+) -> Result<Vec<Case>, SuiteError> {
+    let config = GeneratorConfig::default();
+    config.validate(vehicle)?;
+    let mut cases = Vec::new();
+    for &kind in kinds {
+        for &level in levels {
+            for index in 0..count as u64 {
+                let scene = generate(&config, vehicle, kind, level, seed, index);
+                cases.push(Case { scene, kind: Some(kind), level: Some(level) });
+            }
+        }
+    }
+    Ok(cases)
+}
+
+/// The scenes of a folder, of one parking type if `kind` is given.
+pub fn from_folder(dir: &Path, kind: Option<ParkingType>) -> Result<Vec<Case>, SuiteError> {
+    let cases: Vec<Case> = Scene::read_dir(dir)?
+        .into_iter()
+        .filter(|scene| kind.is_none() || scene.parking_type == kind)
+        .map(|scene| Case { kind: scene.parking_type, level: None, scene })
+        .collect();
+    if cases.is_empty() {
+        let what = kind.map_or(String::new(), |k| format!(" of type {k}"));
+        return Err(SuiteError::NoScenes(format!(
+            "{}: holds no scenes{what}; expected .json or .csv scene files",
+            dir.display()
+        )));
+    }
+    Ok(cases)
+}
+
+/// Checks, before anything runs, that every method can be built and every scene planned.
+pub fn check(cases: &[Case], models: &Models, config: &SuiteConfig) -> Result<(), SuiteError> {
+    let mut names = std::collections::HashSet::new();
+    config.build_all(models)?;
+    for case in cases {
+        let scene = &case.scene;
+        if !names.insert(&scene.name) {
+            return Err(SuiteError::SameName(scene.name.clone()));
+        }
+        if config.methods.iter().any(|m| m.needs_model()) {
+            models.check_vehicle(&scene.name, &scene.vehicle)?;
+        }
+        if let Some(kind) = case.kind {
+            config.methods.iter().try_for_each(|m| models.check_kind(*m, kind))?;
+        }
+        Problem::new(scene)
+            .map_err(|error| SuiteError::Unsolvable { scene: scene.name.clone(), error })?;
+    }
+    Ok(())
+}
+
+impl SuiteConfig {
+    /// The planners of all methods, in their order.
+    pub fn build_all(&self, models: &Models) -> Result<Vec<Box<dyn Planner + Send>>, MethodError> {
+        self.methods.iter().map(|m| m.build(models, &self.planner)).collect()
+    }
+}
+
+/// Runs every method on every case and hands each episode to `sink`, scene by scene and
+/// method by method, as soon as it and all before it are done. The first `skip` episodes
+/// of that order are left out: those an interrupted run has done already.
+///
+/// Returns the rows of this run, or the first error of `sink`.
+pub fn run<E>(
+    cases: &[Case],
+    models: &Models,
+    config: &SuiteConfig,
+    skip: usize,
+    mut sink: impl FnMut(&Case, &Episode) -> Result<(), E>,
+) -> Result<Vec<Row>, E>
+where
+    E: From<SuiteError>,
+{
+    check(cases, models, config)?;
+    let per_case = config.methods.len();
+    let total = cases.len() * per_case;
+    let next = AtomicUsize::new(skip);
+    let (send, receive) = mpsc::channel();
+    std::thread::scope(|scope| {
+        for _ in 0..config.threads.max(1) {
+            let (send, next) = (send.clone(), &next);
+            scope.spawn(move || {
+                let mut planners = config.build_all(models).expect("checked above");
+                let episodes = EpisodeConfig::new(config.max_expansions);
+                loop {
+                    let job = next.fetch_add(1, Ordering::Relaxed);
+                    if job >= total {
+                        break;
+                    }
+                    let (case, planner) = (&cases[job / per_case], &mut planners[job % per_case]);
+                    let episode = episode::run(case, planner.as_mut(), &episodes)
+                        .expect("the problem was made once before");
+                    if send.send((job, episode)).is_err() {
+                        break; // The sink failed: nobody listens any more.
+                    }
+                }
+            });
+        }
+        drop(send);
+        let mut waiting = BTreeMap::new();
+        let mut rows = Vec::new();
+        for (job, episode) in receive {
+            waiting.insert(job, episode);
+            while let Some(episode) = waiting.remove(&(skip + rows.len())) {
+                sink(&cases[(skip + rows.len()) / per_case], &episode)?;
+                rows.push(episode.row);
+            }
+        }
+        Ok(rows)
+    })
+}

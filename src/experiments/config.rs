@@ -1,0 +1,257 @@
+//! What an experiment is: `experiments/NAME.toml`.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::dataset::CollectConfig;
+use crate::evaluation::Method;
+use crate::planners::HybridAStarConfig;
+use crate::training::MlpConfig;
+use crate::vehicle::Vehicle;
+use crate::world::{Level, ParkingType};
+
+/// The version of the format that this crate reads.
+pub const VERSION: u32 = 1;
+
+/// One experiment. Unknown keys are refused, absent sections keep their defaults.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExperimentConfig {
+    /// Version of the format: 1.
+    pub version: u32,
+    /// Name; the results' folder is called so.
+    pub name: String,
+    /// One line for people.
+    #[serde(default)]
+    pub description: String,
+    /// Seed of the collection and the training. Their sections have none of their own.
+    pub seed: u64,
+    /// The vehicle collected, trained and evaluated with.
+    #[serde(default)]
+    pub vehicle: Vehicle,
+    /// The collection, as in `n3p-collect --config`, without `seed` and `vehicle`.
+    #[serde(default)]
+    pub collect: CollectConfig,
+    /// The trainings.
+    #[serde(default)]
+    pub train: TrainConfig,
+    /// The evaluation.
+    pub evaluate: EvaluateConfig,
+}
+
+/// What is trained. KNN needs no settings.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TrainConfig {
+    /// The networks, as in `n3p-train mlp --config`, without `seed`.
+    pub mlp: MlpConfig,
+}
+
+/// Which methods run on which generated scenes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EvaluateConfig {
+    /// The methods, in the order of the rows.
+    pub methods: Vec<Method>,
+    /// Parking types; collected and trained for, too.
+    #[serde(default = "all_types")]
+    pub types: Vec<ParkingType>,
+    /// Levels.
+    #[serde(default = "all_levels")]
+    pub levels: Vec<Level>,
+    /// Scenes per type and level.
+    pub count: usize,
+    /// Seed of the scenes and of the bootstrap intervals.
+    pub seed: u64,
+    /// Expansion budget per episode.
+    #[serde(default = "max_expansions")]
+    pub max_expansions: usize,
+    /// Settings of every search.
+    #[serde(default)]
+    pub planner: HybridAStarConfig,
+}
+
+fn all_types() -> Vec<ParkingType> {
+    ParkingType::ALL.to_vec()
+}
+
+fn all_levels() -> Vec<Level> {
+    Level::ALL.to_vec()
+}
+
+fn max_expansions() -> usize {
+    200_000
+}
+
+/// An experiment that cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("{path}: cannot read: {error}; `n3p-experiment list` shows those there are")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The operating system's reason.
+        error: std::io::Error,
+    },
+    /// It is no TOML, or holds keys or values of the wrong kind.
+    #[error("{path}: line {line}: {message}")]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// Counted from 1.
+        line: usize,
+        /// What is wrong and what would be right.
+        message: String,
+    },
+    /// A value is out of range.
+    #[error("{path}: {message}")]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// Field, value, and what would be right.
+        message: String,
+    },
+}
+
+impl ExperimentConfig {
+    /// Reads, resolves and checks an experiment.
+    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| ConfigError::Read { path: path.to_owned(), error })?;
+        let parse = |e: toml::de::Error| {
+            let line = e.span().map_or(1, |s| 1 + text[..s.start].matches('\n').count());
+            let message = e.message().replace('\n', " ");
+            ConfigError::Parse { path: path.to_owned(), line, message }
+        };
+        let value = |message| ConfigError::Value { path: path.to_owned(), message };
+        let config: Self = toml::from_str(&text).map_err(parse)?;
+        let written: toml::Table = toml::from_str(&text).map_err(parse)?;
+        if let Some(key) = misplaced(&written) {
+            let top = key.rsplit('.').next().unwrap_or(key);
+            return Err(value(format!("{key}: set {top} once, at the top of the file, not here")));
+        }
+        let config = config.resolved();
+        config.validate().map_err(value)?;
+        Ok(config)
+    }
+
+    /// The same with the common settings copied to where they are used.
+    fn resolved(mut self) -> Self {
+        self.collect.vehicle = self.vehicle;
+        self.collect.seed = self.seed;
+        self.train.mlp.seed = self.seed;
+        self
+    }
+
+    fn validate(&self) -> Result<(), String> {
+        if self.version != VERSION {
+            return Err(format!("version is {}; this program reads {VERSION}", self.version));
+        }
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        if self.name.is_empty() || !self.name.chars().all(plain) {
+            return Err(format!(
+                "name is \"{}\"; expected letters, digits, - and _ (it becomes a folder)",
+                self.name
+            ));
+        }
+        self.vehicle.validate().map_err(|e| e.to_string())?;
+        self.collect.validate().map_err(|e| format!("collect: {e}"))?;
+        self.train.mlp.validate().map_err(|e| format!("train.mlp: {e}"))?;
+        let e = &self.evaluate;
+        e.planner.validate().map_err(|m| format!("evaluate.{m}"))?;
+        distinct("evaluate.methods", &e.methods, |m| m.name())?;
+        distinct("evaluate.types", &e.types, |t| t.name())?;
+        distinct("evaluate.levels", &e.levels, |l| l.name())?;
+        for (field, value, max) in [
+            ("evaluate.count", e.count, 1_000_000),
+            ("evaluate.max_expansions", e.max_expansions, 1_000_000_000),
+        ] {
+            if !(1..=max).contains(&value) {
+                return Err(format!("{field} is {value}; expected 1 to {max}"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether some method needs a data set and models.
+    pub fn learns(&self) -> bool {
+        self.evaluate.methods.iter().any(|m| m.needs_model())
+    }
+
+    /// Whether some method needs the networks.
+    pub fn needs_mlp(&self) -> bool {
+        self.evaluate.methods.contains(&Method::MlpN3p)
+    }
+
+    /// The file with every setting spelt out.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("settings are plain values")
+    }
+}
+
+/// A setting that belongs to the top of the file, found in a section.
+fn misplaced(written: &toml::Table) -> Option<&'static str> {
+    let has = |path: &str| {
+        let mut parts = path.split('.');
+        let first = parts.next().and_then(|p| written.get(p));
+        parts.try_fold(first?, |table, part| table.get(part))
+    };
+    ["collect.seed", "collect.vehicle", "train.mlp.seed"].into_iter().find(|p| has(p).is_some())
+}
+
+fn distinct<T: PartialEq>(
+    field: &str,
+    values: &[T],
+    name: impl Fn(&T) -> &'static str,
+) -> Result<(), String> {
+    if values.is_empty() {
+        return Err(format!("{field} is empty; expected at least one"));
+    }
+    match values.iter().enumerate().find(|(i, v)| values[..*i].contains(v)) {
+        Some((_, twice)) => Err(format!("{field} names {} twice; once is enough", name(twice))),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MINIMAL: &str = "version = 1\nname = \"a\"\nseed = 7\n\
+        [evaluate]\nmethods = [\"ha-rs\", \"n3p\"]\ncount = 2\nseed = 3\n";
+
+    fn read(text: &str) -> Result<ExperimentConfig, ConfigError> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.toml");
+        std::fs::write(&path, text).unwrap();
+        ExperimentConfig::read(&path)
+    }
+
+    #[test]
+    fn defaults_fill_in_and_the_resolved_file_says_the_same() {
+        let config = read(MINIMAL).unwrap();
+        assert_eq!((config.collect.seed, config.train.mlp.seed), (7, 7));
+        assert_eq!(config.evaluate.types.len(), 3);
+        assert!(config.learns() && !config.needs_mlp());
+        let again: ExperimentConfig = toml::from_str(&config.to_toml()).unwrap();
+        assert_eq!(again, config);
+    }
+
+    #[test]
+    fn refusals_name_the_field() {
+        for (change, expected) in [
+            (("version = 1", "version = 2"), "version is 2"),
+            (("\"a\"", "\"a/b\""), "name is"),
+            (("count = 2", "count = 0"), "evaluate.count is 0"),
+            (("count = 2", "conut = 2"), "line 6"),
+            (("\"n3p\"", "\"n4p\""), "unknown method"),
+            (("\"n3p\"", "\"ha-rs\""), "twice"),
+            (("[evaluate]", "[collect]\nseed = 1\n[evaluate]"), "collect.seed"),
+        ] {
+            let message = read(&MINIMAL.replace(change.0, change.1)).unwrap_err().to_string();
+            assert!(message.contains(expected) && message.contains("a.toml"), "{message}");
+        }
+    }
+}

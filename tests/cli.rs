@@ -1,0 +1,245 @@
+//! The commands' contract: exit codes, and errors that say file, field and remedy.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use n3p::evaluation::{PathFile, oracle, rows};
+use n3p::world::{Level, ParkingType, Scene};
+use predicates::prelude::*;
+use predicates::str::contains;
+
+fn command(name: &str, dir: &Path) -> Command {
+    let mut command = Command::cargo_bin(name).expect("a binary of this crate");
+    command.current_dir(dir);
+    command
+}
+
+/// A reverse bay between two cars, without obstacles elsewhere.
+const SCENE: &str = r#"{"name": "bay", "source": "",
+ "vehicle": {"length": 4.97, "width": 1.86, "wheelbase": 2.83, "rear_overhang": 1.1,
+             "max_steer": 0.609},
+ "start": [-6, 5.5, 0], "goal": [0, -1.4, 1.5707963267948966], "parking_type": "reverse",
+ "obstacles": [[[-4, -2.7], [-1.5, -2.7], [-1.5, 2.7], [-4, 2.7]],
+               [[1.5, -2.7], [4, -2.7], [4, 2.7], [1.5, 2.7]]],
+ "bounds": null}"#;
+
+/// Runs `n3p-plan --scene` on `text` and expects exit code 2 with all of `parts` on stderr.
+fn refused(text: &str, parts: &[&str]) {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("scene.json"), text).unwrap();
+    let assert = command("n3p-plan", dir.path())
+        .args(["--scene", "scene.json", "--method", "ha-rs"])
+        .assert()
+        .code(2)
+        .stderr(contains("scene.json"));
+    let stderr = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+    for part in parts {
+        assert!(stderr.contains(part), "\"{part}\" not in: {stderr}");
+    }
+    assert!(stderr.trim().lines().count() <= 2, "more than two lines: {stderr}");
+}
+
+#[test]
+fn bad_scenes_are_refused_with_file_field_and_remedy() {
+    refused("", &["empty"]);
+    refused(&SCENE[..SCENE.len() / 2], &["line"]);
+    refused(&SCENE.replace("[-6, 5.5, 0]", "[NaN, 5.5, 0]"), &["line"]);
+    refused(&SCENE.replace("[-6, 5.5, 0]", "[1e999, 5.5, 0]"), &[]);
+    refused(&SCENE.replace("[-6, 5.5, 0]", "[-2, 0, 0]"), &["start", "touches an obstacle"]);
+    refused(&SCENE.replace("[0, -1.4, 1.57", "[2, -1.4, 1.57"), &["goal", "touches an obstacle"]);
+    refused(&SCENE.replace("\"reverse\"", "\"sideways\""), &["sideways", "parallel"]);
+    refused(&SCENE.replace("\"width\": 1.86", "\"width\": -1"), &["width", "between"]);
+}
+
+#[test]
+fn a_missing_scene_and_a_wrong_method_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    command("n3p-plan", dir.path())
+        .args(["--scene", "none.json"])
+        .assert()
+        .code(2)
+        .stderr(contains("none.json"));
+    std::fs::write(dir.path().join("s.json"), SCENE).unwrap();
+    command("n3p-plan", dir.path())
+        .args(["--scene", "s.json", "--method", "a-star"])
+        .assert()
+        .code(2)
+        .stderr(contains("a-star").and(contains("ha-rs")).and(contains("knn-n3p")));
+    command("n3p-plan", dir.path())
+        .args(["--scene", "s.json", "--method", "sha"])
+        .assert()
+        .code(2)
+        .stderr(contains("not available in this version"));
+    command("n3p-plan", dir.path())
+        .args(["--scene", "s.json", "--method", "n3p"])
+        .assert()
+        .code(2)
+        .stderr(contains("--model").and(contains("n3p-train knn")));
+}
+
+#[test]
+fn a_plan_is_printed_written_and_drawn() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("s.json"), SCENE).unwrap();
+    command("n3p-plan", dir.path())
+        .args(["--scene", "s.json", "--out", "path.json", "--svg", "picture.svg"])
+        .assert()
+        .success()
+        .stdout(contains("path by ha-rs").and(contains("direction changes")));
+    let scene = Scene::read(&dir.path().join("s.json")).unwrap();
+    let path = PathFile::read(&dir.path().join("path.json")).unwrap();
+    assert!(oracle::check(&scene, &path).unwrap() > 0.0);
+    let picture = std::fs::read_to_string(dir.path().join("picture.svg")).unwrap();
+    assert!(picture.contains("<svg") && picture.contains("ha-rs"));
+}
+
+#[test]
+fn json_is_machine_readable_and_no_obstacles_are_fine() {
+    let dir = tempfile::tempdir().unwrap();
+    let begin = SCENE.find("\"obstacles\"").unwrap();
+    let end = SCENE.find("\"bounds\"").unwrap();
+    let empty = format!("{}\"obstacles\": [], {}", &SCENE[..begin], &SCENE[end..]);
+    std::fs::write(dir.path().join("s.json"), empty).unwrap();
+    let output = command("n3p-plan", dir.path())
+        .args(["--scene", "s.json", "--method", "ha-rs", "--json"])
+        .assert()
+        .success();
+    let json: serde_json::Value = serde_json::from_slice(&output.get_output().stdout).unwrap();
+    assert_eq!(json["row"]["ok"], true);
+    assert_eq!(json["row"]["min_clearance_m"], serde_json::Value::Null);
+    assert!(json["path"]["poses"].as_array().unwrap().len() > 10);
+}
+
+#[test]
+fn no_path_is_exit_code_3_with_a_reason() {
+    let dir = tempfile::tempdir().unwrap();
+    let wall = "\"obstacles\": [[[-9, 3], [9, 3], [9, 3.2], [-9, 3.2]], \
+                [[-9, -9], [-8, -9], [-8, 3.1], [-9, 3.1]], \
+                [[8, -9], [9, -9], [9, 3.1], [8, 3.1]], \
+                [[-9, -9], [9, -9], [9, -8], [-9, -8]], ";
+    let scene = SCENE.replace("\"obstacles\": [", wall);
+    std::fs::write(dir.path().join("s.json"), scene).unwrap();
+    command("n3p-plan", dir.path())
+        .args(["--scene", "s.json", "--method", "ha-rs"])
+        .assert()
+        .code(3)
+        .stdout(contains("no path by ha-rs"));
+}
+
+#[test]
+fn eval_refuses_bad_arguments() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("file"), "").unwrap();
+    std::fs::write(dir.path().join("text.bin"), "no model").unwrap();
+    std::fs::create_dir(dir.path().join("empty")).unwrap();
+    for (arguments, parts) in [
+        (&["--type", "sideways"][..], &["sideways", "parallel"][..]),
+        (&["--level", "hard"], &["hard", "extreme"]),
+        (&["--methods", "ha-rs,nope"], &["nope", "n3p"]),
+        (&["--methods", "knn-n3p"], &["--model", "n3p-train knn"]),
+        (&["--methods", "rl-eval"], &["not available in this version"]),
+        (&["--model", "none.bin"], &["none.bin", "n3p-train"]),
+        (&["--model", "file"], &["file", "empty"]),
+        (&["--model", "text.bin"], &["text.bin"]),
+        (&["--count", "0"], &["--count"]),
+        (&["--scenes", "nowhere"], &["nowhere"]),
+        (&["--scenes", "empty"], &["empty", "holds no scene"]),
+        (&["--count", "1", "--out", "file/below"], &["file/below", "choose"]),
+    ] {
+        let assert = command("n3p-eval", dir.path()).args(arguments).assert().code(2);
+        let stderr = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+        for part in parts {
+            assert!(stderr.contains(part), "{arguments:?}: \"{part}\" not in: {stderr}");
+        }
+    }
+}
+
+#[test]
+fn a_scene_in_collision_stops_the_evaluation_before_it_runs() {
+    let dir = tempfile::tempdir().unwrap();
+    let scenes = dir.path().join("scenes");
+    std::fs::create_dir(&scenes).unwrap();
+    std::fs::write(scenes.join("a.json"), SCENE).unwrap();
+    let bad = SCENE.replace("\"bay\"", "\"blocked\"").replace("[-6, 5.5, 0]", "[-2, 0, 0]");
+    std::fs::write(scenes.join("b.json"), bad).unwrap();
+    command("n3p-eval", dir.path())
+        .args(["--scenes", "scenes", "--out", "out"])
+        .assert()
+        .code(2)
+        .stderr(contains("blocked").and(contains("start")));
+    assert!(!dir.path().join("out").exists());
+}
+
+#[test]
+fn rows_do_not_depend_on_the_threads() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = |threads: &str| {
+        command("n3p-eval", dir.path())
+            .args(["--count", "2", "--seed", "5", "--methods", "ha-rs", "--threads", threads])
+            .args(["--out", threads, "--paths", "paths"])
+            .assert()
+            .success()
+            .stdout(contains("No failures in 18 rows"));
+        let rows = rows::read_csv(&dir.path().join(threads).join("rows.csv")).unwrap();
+        rows.iter().map(rows::Row::untimed).collect::<Vec<_>>()
+    };
+    let rows = run("1");
+    assert_eq!(rows, run("2"));
+    assert_eq!(rows.len(), ParkingType::ALL.len() * Level::ALL.len() * 2);
+    assert!(rows.iter().all(|r| r.ok && r.checked == "ok"));
+    let paths = std::fs::read_dir(dir.path().join("paths")).unwrap().count();
+    assert_eq!(paths, rows.len());
+    let report = std::fs::read_to_string(dir.path().join("1/report.md")).unwrap();
+    assert!(report.contains("seed 5") && report.contains("HA* with RS"));
+}
+
+#[test]
+fn eval_prints_json() {
+    let dir = tempfile::tempdir().unwrap();
+    let output = command("n3p-eval", dir.path())
+        .args(["--count", "1", "--type", "parallel", "--level", "easy", "--json"])
+        .assert()
+        .success();
+    let json: serde_json::Value = serde_json::from_slice(&output.get_output().stdout).unwrap();
+    assert_eq!(json["rows"][0]["type"], "parallel");
+    assert_eq!(json["groups"][0]["summaries"][0]["method"], "ha-rs");
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0, "nothing without --out");
+}
+
+#[test]
+fn a_wrong_experiment_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let quick = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/quick.toml");
+    let text = std::fs::read_to_string(quick).unwrap();
+    for (old, new, parts) in [
+        ("epochs", "epoks", &["x.toml", "line", "epoks"][..]),
+        ("version = 1", "version = 9", &["version is 9"]),
+        ("\"ha-rs\"", "\"ha-xx\"", &["ha-xx", "ha-rs"]),
+        ("samples_per_cell = 60", "samples_per_cell = 0", &["collect", "samples_per_cell is 0"]),
+        ("samples_per_cell = 60", "seed = 4", &["collect.seed", "at the top"]),
+    ] {
+        assert!(text.contains(old), "{old}");
+        std::fs::write(dir.path().join("x.toml"), text.replacen(old, new, 1)).unwrap();
+        let assert = command("n3p-experiment", dir.path()).args(["run", "x.toml"]).assert().code(2);
+        let stderr = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+        for part in parts {
+            assert!(stderr.contains(part), "\"{part}\" not in: {stderr}");
+        }
+    }
+    command("n3p-experiment", dir.path())
+        .args(["run", "none.toml"])
+        .assert()
+        .code(2)
+        .stderr(contains("none.toml"));
+    std::fs::write(dir.path().join("x.toml"), text).unwrap();
+    command("n3p-experiment", dir.path())
+        .args(["reproduce", "x.toml"])
+        .assert()
+        .code(2)
+        .stderr(contains("n3p-experiment run x.toml"));
+    command("n3p-experiment", dir.path())
+        .args(["list", "."])
+        .assert()
+        .success()
+        .stdout(contains("x.toml: every stage"));
+}

@@ -1,0 +1,88 @@
+//! A tiny experiment from start to end: run, go on after an interruption, reproduce.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use n3p::evaluation::rows::{Row, read_csv};
+use predicates::str::contains;
+
+const TINY: &str = r#"
+version = 1
+name = "tiny"
+description = "one type, four cells"
+seed = 3
+
+[collect]
+samples_per_cell = 20
+max_expansions = 5000
+
+[collect.grid]
+lane_width = { min = 5.0, max = 6.0, step = 1.0 }
+bay_spot_width = { min = 2.4, max = 3.4, step = 1.0 }
+parallel_spot_width = { min = 6.5, max = 7.5, step = 1.0 }
+dead_end = { min = 6.0, max = 8.0, step = 2.0 }
+back = 10.0
+bay_depth = 5.5
+parallel_depth = 2.4
+
+[train.mlp]
+epochs = 2
+validation_share = 0.25
+
+[evaluate]
+methods = ["ha-rs", "mlp-n3p", "knn-n3p", "n3p"]
+types = ["reverse"]
+levels = ["easy", "complex"]
+count = 3
+seed = 11
+"#;
+
+fn experiment(dir: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
+    let mut command = Command::cargo_bin("n3p-experiment").unwrap();
+    command.current_dir(dir).args(arguments).assert()
+}
+
+fn untimed(file: &Path) -> Vec<Row> {
+    read_csv(file).unwrap().iter().map(Row::untimed).collect()
+}
+
+#[test]
+fn runs_goes_on_and_reproduces() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("tiny.toml"), TINY).unwrap();
+    experiment(dir.path(), &["run", "tiny.toml"]).success().stdout(contains("rows"));
+    let results = dir.path().join("results/tiny");
+    for file in ["config.toml", "run.json", "rows.parquet", "report.md", "models/knn.bin"] {
+        assert!(results.join(file).exists(), "{file}");
+    }
+    let rows_csv = results.join("rows.csv");
+    let rows = untimed(&rows_csv);
+    assert_eq!(rows.len(), 2 * 3 * 4);
+    assert!(rows.iter().all(|r| r.checked.is_empty() || r.checked == "ok"));
+
+    // A second run has nothing to do.
+    let before = std::fs::read(&rows_csv).unwrap();
+    experiment(dir.path(), &["run", "tiny.toml"])
+        .success()
+        .stderr(contains("train-knn: finished before"));
+    assert_eq!(std::fs::read(&rows_csv).unwrap(), before);
+
+    // As if killed in the middle of the evaluation: it ends with the same rows.
+    let half: Vec<u8> = before[..before.len() / 2].to_vec();
+    std::fs::write(&rows_csv, &half).unwrap();
+    let stage = results.join("stages/evaluate.json");
+    let record = std::fs::read_to_string(&stage).unwrap();
+    std::fs::write(&stage, record.replace("true", "false")).unwrap();
+    experiment(dir.path(), &["run", "tiny.toml"]).success();
+    assert_eq!(untimed(&rows_csv), rows);
+    let kept = half.iter().rposition(|b| *b == b'\n').unwrap();
+    assert_eq!(std::fs::read(&rows_csv).unwrap()[..kept], half[..kept], "rows done are kept");
+
+    experiment(dir.path(), &["reproduce", "tiny.toml"]).success().stdout(contains("24 rows agree"));
+    let other =
+        std::fs::read_to_string(&rows_csv).unwrap().replacen("ha-rs,true", "ha-rs,false", 1);
+    std::fs::write(&rows_csv, other).unwrap();
+    experiment(dir.path(), &["reproduce", "tiny.toml"])
+        .code(1)
+        .stdout(contains("ok was false, is true"));
+}
