@@ -15,6 +15,8 @@
 //! - [`experiments`]: a whole pipeline from one versioned file
 //! - [`cli`]: what the binaries share
 
+#![warn(missing_docs)]
+
 pub mod cli;
 pub mod curves;
 pub mod dataset;

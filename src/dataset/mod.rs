@@ -12,7 +12,7 @@
 //! A type without manifest is incomplete. Poses are rear-axle poses in the spot frame.
 //!
 //! [`schema`] defines one row; [`config`] what is collected; [`sampler`] draws and solves one
-//! sample; [`collect`] runs the collection and [`write`] its files; [`manifest`] is the folder's
+//! sample; [`mod@collect`] runs the collection and [`mod@write`] its files; [`manifest`] is the folder's
 //! bookkeeping; [`read`] gives the rows back; [`split`] picks the cells that validate.
 
 pub mod collect;

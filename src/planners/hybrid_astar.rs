@@ -5,7 +5,7 @@
 //! keep continuous poses, guided by the larger of two cost-to-go heuristics, and ended by
 //! the first Reeds-Shepp curve that closes the way without contact.
 //!
-//! Ours runs from the goal to the start (see [`super::search`]): measured on the cells of
+//! Ours runs from the goal to the start (see `search.rs`): measured on the cells of
 //! tight bays this takes 10 to 100 times fewer expansions than the other way round. When
 //! a coarse lattice is exhausted, as in a parallel spot barely longer than the car, a finer
 //! one gets its turn.

@@ -64,7 +64,7 @@ mod tests {
         let square = [(-5., -1.), (5., -1.), (5., 1.), (-5., 1.)].map(|(x, y)| Vec2::new(x, y));
         let b = ConvexBounds::new(square);
         let start = Pose::new(0.0, 0.0, 0.0);
-        let half_turn = |k: f64| Segment { curvature: k, length: std::f64::consts::PI / k };
+        let half_turn = |k: f64| Segment { curvature: k, length: std::f64::consts::PI / k.abs() };
         assert!(!b.contains_motion(start, half_turn(1.0)));
         // From y = −1 heading back and forth within two metres of width.
         let low = Pose::new(-1.0, -0.5, std::f64::consts::FRAC_PI_2);

@@ -1,7 +1,7 @@
 //! Exact collision of driven motions.
 //!
 //! A motion is checked whole, not sampled: nothing tunnels through, and one check per
-//! segment replaces hundreds of footprints. [`sweep`] has the geometry, [`index`] finds
+//! segment replaces hundreds of footprints. [`Sweep`] has the geometry, `index` finds
 //! the obstacles near a motion; [`CollisionWorld`] puts both together for one vehicle.
 //! Touching counts as collision.
 
