@@ -53,10 +53,12 @@ impl Path {
         self.segments.iter().fold(self.start, |pose, s| s.end(pose))
     }
 
-    /// The rest of the path from the beginning of segment `index`.
-    pub fn from_segment(&self, index: usize) -> Path {
-        let start = self.segments[..index].iter().fold(self.start, |pose, s| s.end(pose));
-        Path { start, segments: self.segments[index..].to_vec() }
+    /// The path before segment `index`, and the rest.
+    pub fn split_at(&self, index: usize) -> (Path, Path) {
+        let (before, after) = self.segments.split_at(index);
+        let first = Path { start: self.start, segments: before.to_vec() };
+        let rest = Path { start: first.end(), segments: after.to_vec() };
+        (first, rest)
     }
 
     /// Driven length, metres.

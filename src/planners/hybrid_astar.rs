@@ -249,28 +249,46 @@ impl HybridAStar {
         })
     }
 
-    /// Where along `path` the parking manoeuvre begins, and the curve from there to the goal.
+    /// The preparatory pose of a solved `path`, and the curve from there to the goal.
     ///
-    /// The manoeuvre begins at the first change of gear, or, without any, where the last
-    /// turn begins; the tail is taken from the first pose from there on, `snap`ped, that a
-    /// Reeds-Shepp curve (and an entry straight) joins to the goal without contact. Like the
-    /// paper's x_rs it is reachable from the start and one curve away from the goal.
+    /// Like the paper's x_rs it is a pose of the path from which a Reeds-Shepp curve (and an
+    /// entry straight) reaches the goal without contact. Among these poses, `snap`ped, one
+    /// that a curve from the start reaches as well is preferred, so that two curves are the
+    /// whole plan: the one of least cost, and of equals the one where the parking manoeuvre
+    /// begins (the first change of gear, or, without any, the last turn).
     pub fn preparatory_tail(
         &mut self,
         problem: &Problem,
         path: &Path,
         snap: impl Fn(Pose) -> Pose,
     ) -> Option<AnalyticTail> {
-        const SPACING: f64 = 0.25;
+        const SPACING: f64 = 0.5;
+        /// Cheaper by less than this counts as equal.
+        const EQUAL: f64 = 0.05;
         let goal = self.goal_set(problem);
-        let manoeuvre = path.from_segment(manoeuvre_begin(path));
-        manoeuvre.sample(SPACING).into_iter().find_map(|sample| {
+        let (approach, manoeuvre) = path.split_at(manoeuvre_begin(path));
+        let later = manoeuvre.sample(SPACING).into_iter();
+        let earlier = approach.sample(SPACING).into_iter().rev();
+        let mut one_curve = None;
+        let mut two_curves: Option<(f64, AnalyticTail)> = None;
+        for sample in later.chain(earlier) {
             let pose = snap(sample.pose);
             if !problem.collision.pose_is_free(pose) {
-                return None;
+                continue;
             }
-            Some(self.connect(problem, pose, &goal)?.tail())
-        })
+            let Some(tail) = self.connect(problem, pose, &goal).map(|c| c.tail()) else { continue };
+            one_curve = one_curve.or(Some(tail));
+            let Some(leg) = self.direct(problem, path.start, &GoalSet::single(pose)) else {
+                continue;
+            };
+            let mut whole = leg.path;
+            whole.extend(tail.segments());
+            let cost = self.config.cost.path(&problem.vehicle, &whole.segments);
+            if two_curves.is_none_or(|(best, _)| cost < best - EQUAL) {
+                two_curves = Some((cost, tail));
+            }
+        }
+        two_curves.map(|(_, tail)| tail).or(one_curve)
     }
 
     /// Where the search may go: around start and goal, within the bounds.
