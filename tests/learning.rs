@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use n3p::curves::Segment;
 use n3p::dataset::{Metadata, Sample, Status};
 use n3p::geometry::{Pose, signed_angle};
 use n3p::planners::HybridAStarConfig;
@@ -10,7 +11,7 @@ use n3p::selectors::artefact::{Fault, Model, find_model};
 use n3p::selectors::knn::KnnSelector;
 use n3p::selectors::mlp::MlpSelector;
 use n3p::selectors::network::{LAYERS, pose_from_outputs};
-use n3p::selectors::{Features, PoseSelector};
+use n3p::selectors::{Features, PoseSelector, Proposal};
 use n3p::training::{self, Loss, MlpConfig, TrainingError};
 use n3p::vehicle::Vehicle;
 use n3p::world::ParkingType;
@@ -65,6 +66,10 @@ fn sample(kind: ParkingType, cell: usize, index: usize, start: Pose) -> Sample {
         rs_word: "L+R-".to_owned(),
         rs_lengths: [1.0, -1.0, 0.0, 0.0, 0.0],
         entry: 0.0,
+        // Two of three samples end with one of four manoeuvres.
+        manoeuvre: (0..index % 3)
+            .map(|i| Segment { curvature: 0.25, length: 0.5 + (i + index % 4) as f64 })
+            .collect(),
         path_length: 10.0,
         direction_changes: 1,
         expansions: 10,
@@ -144,8 +149,10 @@ fn a_stored_start_returns_its_own_pose() {
         let mut out = Vec::new();
         knn.select(&Features::new(s.start, s.cell), 1, &mut out);
         assert_eq!(out.len(), 1);
-        assert!(out[0].distance(s.rs_start) < 2e-6, "{:?} {:?}", out[0], s.rs_start);
-        assert!(signed_angle(out[0].heading, s.rs_start.heading).abs() < 1e-6);
+        let pose = out[0].pose;
+        assert!(pose.distance(s.rs_start) < 2e-6, "{pose:?} {:?}", s.rs_start);
+        assert_eq!(out[0].manoeuvre, s.manoeuvre);
+        assert!(signed_angle(pose.heading, s.rs_start.heading).abs() < 1e-6);
     }
 }
 
@@ -180,16 +187,19 @@ fn several_poses_differ_and_keep_their_order() {
     let dir = tempfile::tempdir().unwrap();
     let knn = knn_of(&samples(KIND, &[4], 200, 3), &[KIND], dir.path());
     let query = features(Pose::new(1.0, 3.0, 0.1), 4);
-    let (mut one, mut many) = (Vec::new(), vec![Pose::default()]);
+    let before = Proposal { pose: Pose::default(), manoeuvre: Vec::new() };
+    let (mut one, mut many) = (Vec::new(), vec![before.clone()]);
     knn.select(&query, 1, &mut one);
     knn.select(&query, 5, &mut many);
-    assert_eq!(many[0], Pose::default(), "poses are appended");
+    assert_eq!(many[0], before, "proposals are appended");
     assert_eq!(one[0], many[1]);
     assert!(many.len() > 2 && many.len() <= 6, "{many:?}");
     for (i, a) in many[1..].iter().enumerate() {
         for b in &many[i + 2..] {
-            let same = a.distance(*b) <= KnnSelector::SAME_POSITION
-                && signed_angle(a.heading, b.heading).abs() <= KnnSelector::SAME_HEADING;
+            let (p, q) = (a.pose, b.pose);
+            let same = a.manoeuvre == b.manoeuvre
+                && p.distance(q) <= KnnSelector::SAME_POSITION
+                && signed_angle(p.heading, q.heading).abs() <= KnnSelector::SAME_HEADING;
             assert!(!same, "{a:?} {b:?}");
         }
     }

@@ -12,7 +12,9 @@ use rayon::prelude::*;
 use serde_json::Value;
 
 use super::manifest::{Manifest, ShardRecord, manifest_path, metadata_path, sha256, shard_name};
-use super::schema::{FORMAT_VERSION, Metadata, Sample, Status, columns, first_difference};
+use super::schema::{
+    FORMAT_VERSION, Metadata, Sample, Status, columns, first_difference, parse_manoeuvre,
+};
 use super::write::METADATA_KEY;
 use crate::geometry::Pose;
 use crate::vehicle::Vehicle;
@@ -302,7 +304,7 @@ fn rows(
     };
     let start = pose(["start_x_m", "start_y_m", "start_heading_rad"]);
     let rs_start = pose(["rs_x_m", "rs_y_m", "rs_heading_rad"]);
-    let (status, word) = (text("status"), text("rs_word"));
+    let (status, word, manoeuvre) = (text("status"), text("rs_word"), text("manoeuvre"));
     let lengths = [1, 2, 3, 4, 5].map(|n| single(&format!("rs_length_{n}_m")));
     let (entry, path_length) = (single("entry_m"), single("path_length_m"));
     let (changes, expansions) = (number("direction_changes"), number("expansions"));
@@ -331,6 +333,8 @@ fn rows(
             rs_word: word.value(i).to_owned(),
             rs_lengths: lengths.map(|column| column.value(i).into()),
             entry: entry.value(i).into(),
+            manoeuvre: parse_manoeuvre(manoeuvre.value(i))
+                .ok_or_else(|| at(format!("unreadable manoeuvre \"{}\"", manoeuvre.value(i))))?,
             path_length: path_length.value(i).into(),
             direction_changes: changes.value(i),
             expansions: expansions.value(i),

@@ -66,7 +66,14 @@ impl<'a> Sampler<'a> {
             let snap = |p: Pose| to_step(Pose { heading: wrap_angle(p.heading), ..p });
             self.planner.preparatory_tail(problem, path, snap)
         });
-        fill(unsolved(start, Status::NoPath), &result, tail.as_ref()).rounded()
+        let mut row = fill(unsolved(start, Status::NoPath), &result, tail.as_ref()).rounded();
+        if let Ok(path) = &result.outcome
+            && result.expansions > 0
+        {
+            row.manoeuvre = self.planner.manoeuvre(problem, path).unwrap_or_default();
+            row = row.rounded();
+        }
+        row
     }
 }
 

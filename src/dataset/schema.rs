@@ -4,13 +4,14 @@ use arrow_schema::{DataType, Field, Schema};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::curves::Segment;
 use crate::geometry::Pose;
 use crate::planners::HybridAStarConfig;
 use crate::vehicle::Vehicle;
 use crate::world::cell::{Cell, Grid};
 
 /// Version of the data format that this crate writes and reads.
-pub const FORMAT_VERSION: u32 = 1;
+pub const FORMAT_VERSION: u32 = 2;
 
 /// Git revision of this build; `unknown` outside a checkout.
 pub const GIT_REVISION: &str = env!("N3P_GIT_REVISION");
@@ -80,6 +81,10 @@ pub struct Sample {
     pub rs_lengths: [f64; 5],
     /// Signed length of the entry straight after the curve, metres; rounded like the curve's.
     pub entry: f64,
+    /// How the path ends: the motions from a pose that one curve from the start reaches, to
+    /// the goal. Empty where one curve reaches the goal itself. Rounded to f32; the pose
+    /// follows by driving back from the goal.
+    pub manoeuvre: Vec<Segment>,
     /// Length of the whole path, metres; rounded like the curve's.
     pub path_length: f64,
     /// Direction changes of the whole path.
@@ -118,6 +123,7 @@ impl Sample {
             rs_word: String::new(),
             rs_lengths: [nan; 5],
             entry: nan,
+            manoeuvre: Vec::new(),
             path_length: nan,
             direction_changes: 0,
             expansions: 0,
@@ -133,9 +139,28 @@ impl Sample {
         self.rs_start = Pose::new(to_f32(p.x), to_f32(p.y), to_f32(p.heading));
         self.rs_lengths = self.rs_lengths.map(length);
         self.entry = length(self.entry);
+        for s in &mut self.manoeuvre {
+            *s = Segment { curvature: to_f32(s.curvature), length: to_f32(s.length) };
+        }
         self.path_length = length(self.path_length);
         self
     }
+}
+
+/// Segments as text: `curvature:length` pairs (1/m, m), blanks between.
+pub(super) fn manoeuvre_text(segments: &[Segment]) -> String {
+    let pair = |s: &Segment| format!("{}:{}", s.curvature as f32, s.length as f32);
+    segments.iter().map(pair).collect::<Vec<_>>().join(" ")
+}
+
+/// Reads [`manoeuvre_text`]; `None` unless every number is finite.
+pub(super) fn parse_manoeuvre(text: &str) -> Option<Vec<Segment>> {
+    let number = |v: &str| v.parse::<f32>().ok().filter(|v| v.is_finite()).map(f64::from);
+    let pair = |pair: &str| {
+        let (curvature, length) = pair.split_once(':')?;
+        Some(Segment { curvature: number(curvature)?, length: number(length)? })
+    };
+    text.split_whitespace().map(pair).collect()
 }
 
 /// `pose` on the raster of start poses.
@@ -176,6 +201,7 @@ pub fn columns() -> Schema {
         ("rs_length_4_m", Float32),
         ("rs_length_5_m", Float32),
         ("entry_m", Float32),
+        ("manoeuvre", Utf8),
         ("path_length_m", Float32),
         ("direction_changes", UInt32),
         ("expansions", UInt32),

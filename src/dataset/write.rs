@@ -17,7 +17,7 @@ use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::schema::types::ColumnPath;
 
-use super::schema::{Metadata, Sample, columns};
+use super::schema::{Metadata, Sample, columns, manoeuvre_text};
 
 /// Key of the [`Metadata`] JSON in a Parquet file's key-value metadata.
 pub const METADATA_KEY: &str = "n3p";
@@ -90,6 +90,9 @@ fn arrays(samples: &[Sample]) -> Vec<ArrayRef> {
         single(&|s| s.rs_lengths[3]),
         single(&|s| s.rs_lengths[4]),
         single(&|s| s.entry),
+        Arc::new(StringArray::from_iter_values(
+            samples.iter().map(|s| manoeuvre_text(&s.manoeuvre)),
+        )),
         single(&|s| s.path_length),
         small(&|s| s.direction_changes),
         small(&|s| s.expansions),

@@ -12,7 +12,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::curves::Path;
+use crate::curves::{Path, Segment};
 use crate::geometry::{Aabb, Pose};
 use crate::vehicle::Vehicle;
 
@@ -289,6 +289,25 @@ impl HybridAStar {
             }
         }
         two_curves.map(|(_, tail)| tail).or(one_curve)
+    }
+
+    /// The end of a solved `path`: the motions to the goal from the pose, among those where
+    /// the path's curvature or gear changes, that one curve from the start joins at the least
+    /// cost. What lies before it is replaceable by that curve from starts nearby as well.
+    pub fn manoeuvre(&mut self, problem: &Problem, path: &Path) -> Option<Vec<Segment>> {
+        let cost = self.config.cost;
+        let mut best: Option<(f64, usize)> = None;
+        for (i, (pose, _)) in path.legs().enumerate() {
+            let Some(mut leg) = self.direct(problem, path.start, &GoalSet::single(pose)) else {
+                continue;
+            };
+            leg.path.extend(path.segments[i..].iter().copied());
+            let total = cost.path(&problem.vehicle, &leg.path.segments);
+            if best.is_none_or(|(least, _)| total < least) {
+                best = Some((total, i));
+            }
+        }
+        best.map(|(_, i)| path.segments[i..].to_vec())
     }
 
     /// Where the search may go: around start and goal, within the bounds.

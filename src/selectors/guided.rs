@@ -16,7 +16,7 @@ use crate::planners::{
 };
 use crate::world::abstraction::{Abstraction, abstractions};
 
-use super::{Features, PoseSelector};
+use super::{Features, PoseSelector, Proposal};
 
 /// How many ranked poses `n3p` asks for in each abstraction.
 const CANDIDATES: usize = 8;
@@ -38,7 +38,7 @@ pub struct GuidedPlanner {
     strategy: Strategy,
     selector: Arc<dyn PoseSelector>,
     hars: HybridAStar,
-    poses: Vec<Pose>,
+    proposals: Vec<Proposal>,
 }
 
 impl GuidedPlanner {
@@ -59,16 +59,23 @@ impl GuidedPlanner {
         config: HybridAStarConfig,
     ) -> Self {
         let hars = HybridAStar::new(config);
-        Self { name: name.to_owned(), strategy, selector, hars, poses: Vec::new() }
+        Self { name: name.to_owned(), strategy, selector, hars, proposals: Vec::new() }
     }
 
-    /// Up to `k` preparatory poses for an abstraction of `problem`, planning frame.
+    /// Asks for up to `k` proposals for an abstraction of `problem`, in the planning frame.
     fn select(&mut self, problem: &Problem, found: &Abstraction, k: usize) {
         // The cell's frame lies `shift` further out than the problem's.
         let start = Pose { y: problem.start.y - found.shift, ..problem.start };
-        self.poses.clear();
-        self.selector.select(&Features::new(start, found.cell), k, &mut self.poses);
-        self.poses.iter_mut().for_each(|p| p.y += found.shift);
+        self.proposals.clear();
+        self.selector.select(&Features::new(start, found.cell), k, &mut self.proposals);
+        for proposal in &mut self.proposals {
+            proposal.pose.y += found.shift;
+            if found.shift > 0.0 && !proposal.manoeuvre.is_empty() {
+                // The cell's goal is not yet the parked pose: the rest is straight on.
+                let gear = problem.entry_gears().first().map_or(1.0, |g| g.sign());
+                proposal.manoeuvre.push(Segment::straight(gear * found.shift));
+            }
+        }
     }
 
     fn plan_paper(
@@ -79,7 +86,7 @@ impl GuidedPlanner {
     ) -> Attempt {
         let found = *found.first()?;
         self.select(problem, &found, 1);
-        let pose = *self.poses.first()?;
+        let pose = self.proposals.first()?.pose;
         if !problem.collision.pose_is_free(pose) {
             return None;
         }
@@ -103,10 +110,8 @@ impl GuidedPlanner {
         let mut goal = plain.clone();
         for found in found.iter().take(ABSTRACTIONS) {
             self.select(problem, found, CANDIDATES);
-            for i in 0..self.poses.len() {
-                let Some((pose, rest)) = self.feasible(problem, self.poses[i], &plain) else {
-                    continue;
-                };
+            for i in 0..self.proposals.len() {
+                let Some((pose, rest)) = self.rest_of(problem, i, &plain) else { continue };
                 let cost = self.hars.config().cost;
                 goal.add_preparatory(pose, rest, &problem.vehicle, &cost);
             }
@@ -132,6 +137,25 @@ impl GuidedPlanner {
         }
         let leg = self.hars.search(problem, problem.start, &plain, left)?;
         Ok((leg.path, guidance(None, Route::Fallback)))
+    }
+
+    /// The preparatory pose of proposal `i` and the way from there to the goal.
+    fn rest_of(
+        &mut self,
+        problem: &Problem,
+        i: usize,
+        goal: &GoalSet,
+    ) -> Option<(Pose, Vec<Segment>)> {
+        let Proposal { pose, manoeuvre } = &mut self.proposals[i];
+        if manoeuvre.is_empty() {
+            let pose = *pose;
+            return self.feasible(problem, pose, goal);
+        }
+        // Free by construction in the cell, and thus in the scene; the certificate of the
+        // whole path still checks it.
+        let rest = std::mem::take(manoeuvre);
+        let begin = rest.iter().rev().fold(problem.goal, |pose, s| s.reversed().end(pose));
+        problem.collision.pose_is_free(begin).then_some((begin, rest))
     }
 
     /// `pose`, or one beside it, from which a curve leads to the goal, and that curve.

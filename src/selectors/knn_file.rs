@@ -1,4 +1,4 @@
-//! The file format `knn.bin`, version 1.
+//! The file format `knn.bin`, version 2.
 //!
 //! All numbers are little-endian. Nothing needs alignment, so the file is used as mapped.
 //!
@@ -10,16 +10,19 @@
 //! | 8 | length of the payload |
 //! | 32 | SHA-256 of the 24 bytes above, the header and the payload |
 //! | … | header: [`KnnHeader`] as JSON |
-//! | … | payload: for each entry of [`KnnHeader::kinds`] three arrays |
+//! | … | payload: for each entry of [`KnnHeader::kinds`] six arrays |
 //!
 //! The arrays of a parking type: `cells + 1` offsets (u32), where cell `i` owns the samples
 //! `offsets[i]..offsets[i + 1]`; the starts (3 × i16 each); the preparatory poses
-//! (3 × 24-bit integer each). Positions count in `extent / 32767` metres for starts, which
+//! (3 × 24-bit integer each); each sample's manoeuvre (u32, all ones for none); where the
+//! manoeuvres begin among the segments (`manoeuvres + 1` × u32); the segments (curvature in
+//! 1/m and signed length in m, 2 × f32 each). Positions count in `extent / 32767` metres for starts, which
 //! only enter a distance, and in `extent / 8388607` metres for poses; headings in
 //! π / 32767 and π / 8388607 radians. With an extent of 16 m a pose is exact to 1 µm and
 //! 0.2 µrad, some thousand times below the planner's clearance margin
 //! ([`crate::planners::Problem::MARGIN`]), so rounding does not take its free Reeds-Shepp
-//! connection away. A sample takes 15 bytes.
+//! connection away. Manoeuvres are driven back from the goal, so they always end there. A
+//! sample takes 19 bytes; equal manoeuvres are stored once.
 
 use std::f64::consts::PI;
 use std::fs::File;
@@ -30,6 +33,7 @@ use memmap2::Mmap;
 use serde::{Deserialize, Serialize};
 
 use super::artefact::{self, ArtefactError, Fault};
+use crate::curves::Segment;
 use crate::geometry::{Pose, wrap_angle};
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
@@ -38,12 +42,15 @@ use crate::world::cell::Grid;
 /// First bytes of every `knn.bin`.
 pub const MAGIC: [u8; 8] = *b"N3P-KNN\0";
 /// The format version written and read by this program.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 const PREAMBLE: usize = 56;
 const CHECKSUM: Range<usize> = 24..56;
 const START_BYTES: usize = 6;
 const POSE_BYTES: usize = 9;
+const SEGMENT_BYTES: usize = 8;
+/// In place of a manoeuvre's index.
+const NO_MANOEUVRE: u32 = u32::MAX;
 const START_STEPS: f64 = 32_767.0;
 const POSE_STEPS: f64 = 8_388_607.0;
 
@@ -79,10 +86,14 @@ pub struct KindHeader {
     pub cells: usize,
     /// Number of samples.
     pub samples: usize,
+    /// Number of different manoeuvres.
+    pub manoeuvres: usize,
+    /// Number of segments of all manoeuvres.
+    pub segments: usize,
 }
 
 /// One stored sample.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct KnnEntry {
     /// Index of its cell.
     pub cell: u32,
@@ -90,14 +101,25 @@ pub struct KnnEntry {
     pub start: Pose,
     /// Rear-axle preparatory pose, spot frame.
     pub preparatory: Pose,
+    /// Index of its manoeuvre.
+    pub manoeuvre: Option<u32>,
 }
 
-/// The bytes of a file. `entries`: the samples of each of [`KnnHeader::kinds`], sorted by
-/// cell; a sample's order within its cell breaks ties between equally near neighbours.
-pub fn encode(header: &KnnHeader, entries: &[Vec<KnnEntry>]) -> Vec<u8> {
+/// The samples and manoeuvres of one parking type.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct KnnEntries {
+    /// The samples, sorted by cell; the order within a cell breaks ties between equally near
+    /// neighbours.
+    pub samples: Vec<KnnEntry>,
+    /// The manoeuvres, in driving order, each ending at the goal.
+    pub manoeuvres: Vec<Vec<Segment>>,
+}
+
+/// The bytes of a file. `entries`: of each of [`KnnHeader::kinds`].
+pub fn encode(header: &KnnHeader, entries: &[KnnEntries]) -> Vec<u8> {
     let json = serde_json::to_vec(header).expect("a header is plain data");
     let mut payload = Vec::new();
-    for (kind, entries) in header.kinds.iter().zip(entries) {
+    for (kind, KnnEntries { samples: entries, manoeuvres }) in header.kinds.iter().zip(entries) {
         for cell in 0..=kind.cells {
             let offset = entries.partition_point(|e| (e.cell as usize) < cell) as u32;
             payload.extend(offset.to_le_bytes());
@@ -111,6 +133,19 @@ pub fn encode(header: &KnnHeader, entries: &[Vec<KnnEntry>]) -> Vec<u8> {
             for v in steps(e.preparatory, header.extent, POSE_STEPS) {
                 payload.extend(&v.to_le_bytes()[..3]);
             }
+        }
+        for e in entries {
+            payload.extend(e.manoeuvre.unwrap_or(NO_MANOEUVRE).to_le_bytes());
+        }
+        let mut begin = 0_u32;
+        for manoeuvre in manoeuvres {
+            payload.extend(begin.to_le_bytes());
+            begin += manoeuvre.len() as u32;
+        }
+        payload.extend(begin.to_le_bytes());
+        for s in manoeuvres.iter().flatten() {
+            payload.extend((s.curvature as f32).to_le_bytes());
+            payload.extend((s.length as f32).to_le_bytes());
         }
     }
     let mut bytes = MAGIC.to_vec();
@@ -139,6 +174,9 @@ struct Section {
     offsets: usize,
     starts: usize,
     poses: usize,
+    manoeuvres: usize,
+    segment_begins: usize,
+    segments: usize,
 }
 
 impl KnnFile {
@@ -185,6 +223,26 @@ impl KnnFile {
             [0, 3, 6].map(|i| i32::from_le_bytes([0, bytes[i], bytes[i + 1], bytes[i + 2]]) >> 8);
         pose(v, self.header.extent, POSE_STEPS)
     }
+
+    /// Index of a sample's manoeuvre; `None` where one curve reaches the goal.
+    pub fn manoeuvre(&self, kind: usize, sample: usize) -> Option<usize> {
+        let index = u32_at(&self.map, self.sections[kind].manoeuvres + 4 * sample);
+        (index != NO_MANOEUVRE).then_some(index as usize)
+    }
+
+    /// The motions of a manoeuvre, in driving order; they end at the goal.
+    pub fn segments(&self, kind: usize, manoeuvre: usize) -> impl Iterator<Item = Segment> + '_ {
+        let section = &self.sections[kind];
+        let begin = |i: usize| u32_at(&self.map, section.segment_begins + 4 * i) as usize;
+        (begin(manoeuvre)..begin(manoeuvre + 1)).map(|i| {
+            let at = section.segments + SEGMENT_BYTES * i;
+            Segment { curvature: f32_at(&self.map, at), length: f32_at(&self.map, at + 4) }
+        })
+    }
+}
+
+fn f32_at(bytes: &[u8], at: usize) -> f64 {
+    f64::from(f32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes")))
 }
 
 fn map(file: &File) -> std::io::Result<Mmap> {
@@ -244,16 +302,34 @@ fn sections(bytes: &[u8], payload: usize, header: &KnnHeader) -> Result<Vec<Sect
         }
         let size = k
             .samples
-            .checked_mul(START_BYTES + POSE_BYTES)
+            .checked_mul(START_BYTES + POSE_BYTES + 4)
             .and_then(|n| n.checked_add(4 * (cells + 1)))
+            .and_then(|n| n.checked_add(k.manoeuvres.checked_add(1)?.checked_mul(4)?))
+            .and_then(|n| n.checked_add(k.segments.checked_mul(SEGMENT_BYTES)?))
             .filter(|n| *n <= bytes.len() - at)
             .ok_or_else(|| format!("{}: {} samples do not fit", k.kind, k.samples))?;
         let starts = at + 4 * (cells + 1);
-        let section = Section { offsets: at, starts, poses: starts + START_BYTES * k.samples };
+        let poses = starts + START_BYTES * k.samples;
+        let manoeuvres = poses + POSE_BYTES * k.samples;
+        let segment_begins = manoeuvres + 4 * k.samples;
+        let segments = segment_begins + 4 * (k.manoeuvres + 1);
+        let section = Section { offsets: at, starts, poses, manoeuvres, segment_begins, segments };
         let offset = |i: usize| u32_at(bytes, at + 4 * i) as usize;
         let rising = (0..cells).all(|i| offset(i) <= offset(i + 1));
         if offset(0) != 0 || offset(cells) != k.samples || !rising {
             return Err(format!("{}: the offsets of the cells do not rise in order", k.kind));
+        }
+        let begin = |i: usize| u32_at(bytes, segment_begins + 4 * i) as usize;
+        let rising = (0..k.manoeuvres).all(|i| begin(i) <= begin(i + 1));
+        if begin(0) != 0 || begin(k.manoeuvres) != k.segments || !rising {
+            return Err(format!("{}: the manoeuvres do not rise in order", k.kind));
+        }
+        let known = |i: usize| {
+            let index = u32_at(bytes, manoeuvres + 4 * i);
+            index == NO_MANOEUVRE || (index as usize) < k.manoeuvres
+        };
+        if !(0..k.samples).all(known) {
+            return Err(format!("{}: a sample names a manoeuvre that does not exist", k.kind));
         }
         sections.push(section);
         at += size;

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::artefact::{self, ArtefactError, Fault};
 use super::network::{self, LAYERS, LayerWeights, Network, OUTPUTS};
-use super::{Features, Normaliser, PoseSelector};
+use super::{Features, Normaliser, PoseSelector, Proposal};
 use crate::geometry::Pose;
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
@@ -184,9 +184,10 @@ impl MlpSelector {
 }
 
 impl PoseSelector for MlpSelector {
-    fn select(&self, features: &Features, k: usize, out: &mut Vec<Pose>) {
+    fn select(&self, features: &Features, k: usize, out: &mut Vec<Proposal>) {
         if k > 0 {
-            out.extend(self.predict(features).filter(|pose| pose.is_finite()));
+            let pose = self.predict(features).filter(|pose| pose.is_finite());
+            out.extend(pose.map(|pose| Proposal { pose, manoeuvre: Vec::new() }));
         }
     }
 

@@ -1,12 +1,14 @@
 //! Samples → `knn.bin`.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use super::{TrainingError, solved};
+use crate::curves::Segment;
 use crate::dataset::{Metadata, Sample};
 use crate::geometry::Pose;
 use crate::selectors::artefact::write_atomic;
-use crate::selectors::knn_file::{self, KindHeader, KnnEntry, KnnHeader};
+use crate::selectors::knn_file::{self, KindHeader, KnnEntries, KnnEntry, KnnHeader};
 use crate::world::ParkingType;
 
 /// What was stored.
@@ -40,10 +42,15 @@ pub fn train(
         }
         let occupied = solved.chunk_by(|a, b| a.cell_index == b.cell_index).count();
         report.push((kind, solved.len(), occupied));
-        headers.push(KindHeader { kind, cells, samples: solved.len() });
-        let entry =
-            |s: &&Sample| KnnEntry { cell: s.cell_index, start: s.start, preparatory: s.rs_start };
-        entries.push(solved.iter().map(entry).collect::<Vec<_>>());
+        let collected = collect(&solved);
+        headers.push(KindHeader {
+            kind,
+            cells,
+            samples: solved.len(),
+            manoeuvres: collected.manoeuvres.len(),
+            segments: collected.manoeuvres.iter().map(Vec::len).sum(),
+        });
+        entries.push(collected);
     }
     let header = KnnHeader {
         vehicle: metadata.vehicle,
@@ -60,10 +67,28 @@ pub fn train(
     Ok(KnnReport { kinds: report, bytes: bytes.len() })
 }
 
+/// The samples, and each different manoeuvre once.
+fn collect(solved: &[&Sample]) -> KnnEntries {
+    let mut entries = KnnEntries::default();
+    let mut known: HashMap<Vec<[u64; 2]>, u32> = HashMap::new();
+    for s in solved {
+        let manoeuvre = (!s.manoeuvre.is_empty()).then(|| {
+            let bits = |m: &Segment| [m.curvature.to_bits(), m.length.to_bits()];
+            *known.entry(s.manoeuvre.iter().map(bits).collect()).or_insert_with(|| {
+                entries.manoeuvres.push(s.manoeuvre.clone());
+                entries.manoeuvres.len() as u32 - 1
+            })
+        });
+        let (cell, start, preparatory) = (s.cell_index, s.start, s.rs_start);
+        entries.samples.push(KnnEntry { cell, start, preparatory, manoeuvre });
+    }
+    entries
+}
+
 /// The least power of two, from 16 m, that no coordinate exceeds.
-fn extent(entries: &[Vec<KnnEntry>]) -> f64 {
+fn extent(entries: &[KnnEntries]) -> f64 {
     let largest = |p: Pose| p.x.abs().max(p.y.abs());
-    let all = entries.iter().flatten();
+    let all = entries.iter().flat_map(|e| &e.samples);
     let most = all.fold(0.0, |m: f64, e| m.max(largest(e.start)).max(largest(e.preparatory)));
     let mut extent = 16.0;
     while extent < most {
