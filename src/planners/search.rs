@@ -182,6 +182,17 @@ impl Search {
         wants
     }
 
+    /// Cost from `node` to the goal.
+    pub fn cost(&self, node: NodeIndex) -> f64 {
+        f64::from(self.nodes[node as usize].cost)
+    }
+
+    /// Estimated cost of a whole path through `node`.
+    pub fn estimate(&self, node: NodeIndex) -> f64 {
+        let n = &self.nodes[node as usize];
+        f64::from(n.cost + n.to_come)
+    }
+
     /// The pose of `node`.
     pub fn pose(&self, node: NodeIndex) -> Pose {
         self.nodes[node as usize].pose

@@ -128,14 +128,14 @@ impl GuidedPlanner {
             let share = (*left).min(APPROACH_EXPANSIONS);
             *left -= share;
             let mut spend = share;
-            let leg = self.hars.search(problem, problem.start, &preparatory, &mut spend);
+            let leg = self.hars.search(problem, problem.start, &preparatory, None, &mut spend);
             *left += spend;
             if let Ok(leg) = leg {
                 let entry = preparatory.entries().get(leg.entry);
                 return Ok((leg.path, guidance(entry, Route::Searched)));
             }
         }
-        let leg = self.hars.search(problem, problem.start, &plain, left)?;
+        let leg = self.hars.search(problem, problem.start, &plain, None, left)?;
         Ok((leg.path, guidance(None, Route::Fallback)))
     }
 
