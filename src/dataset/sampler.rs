@@ -46,7 +46,11 @@ impl CellProblem {
 impl<'a> Sampler<'a> {
     /// A sampler with `config`, which must be valid.
     pub fn new(config: &'a CollectConfig) -> Self {
-        Self { config, planner: HybridAStar::hold(config.planner, config.solutions as usize), current: None }
+        Self {
+            config,
+            planner: HybridAStar::hold(config.planner, config.solutions as usize),
+            current: None,
+        }
     }
 
     /// The sample `sample_index` of the cell `cell_index`.

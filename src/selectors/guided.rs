@@ -19,7 +19,7 @@ use crate::world::abstraction::{Abstraction, abstractions};
 use super::{Features, PoseSelector, Proposal};
 
 /// How many ranked poses `n3p` asks for in each abstraction.
-const CANDIDATES: usize = 8;
+const CANDIDATES: usize = 12;
 /// How many abstractions `n3p` tries.
 const ABSTRACTIONS: usize = 3;
 /// Expansions that `n3p` spends on the way to the preparatory poses before it searches for
