@@ -243,8 +243,8 @@ def mean(values):
     return f"{statistics.mean(values):.2f}" if values else "–"
 
 
-def milliseconds(seconds):
-    return f"{1e3 * seconds:.3g}"
+def three_digits(value):
+    return f"{value:.3g}" if value < 1000 else f"{value:.0f}"
 
 
 def table(results, base):
@@ -267,8 +267,8 @@ def table(results, base):
                 middle = statistics.median(times)
                 print(f"| {kind} | {level} | {name} | {len(done)}/{len(episodes)} "
                       f"| {sum(e['free'] for e in episodes)}/{len(episodes)} "
-                      f"| {milliseconds(middle)} | {milliseconds(statistics.mean(times))} "
-                      f"| {middle / reference:.3g} | {mean(e['length_m'] for e in done)} "
+                      f"| {three_digits(1e3 * middle)} | {three_digits(1e3 * statistics.mean(times))} "
+                      f"| {three_digits(middle / reference)} | {mean(e['length_m'] for e in done)} "
                       f"| {mean(e['changes'] for e in done)} |")
 
 
