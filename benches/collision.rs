@@ -15,7 +15,7 @@ use n3p::geometry::{Pose, Vec2};
 use n3p::planners::Problem;
 use n3p::rng::{Stream, rng};
 use n3p::vehicle::Vehicle;
-use n3p::world::collision::{CollisionWorld, Sweep};
+use n3p::world::collision::{BodyFrame, CollisionWorld, Sweep};
 use n3p::world::{Level, Obstacles, ParkingType};
 use rand::RngExt;
 
@@ -65,7 +65,7 @@ fn bench(c: &mut Criterion) {
         group.bench_function(name, |b| {
             b.iter(|| {
                 let (&pose, sweep) = next.next().expect("endless");
-                world.sweep_is_free(black_box(pose), sweep)
+                world.sweep_is_free(&BodyFrame::new(black_box(pose)), sweep)
             });
         });
     }

@@ -106,12 +106,20 @@ impl GoalSet {
         &self.entries
     }
 
-    /// Adds every free entry straight into the goal of `problem`, `step` metres apart and
-    /// at most `longest` metres long.
-    pub fn add_straights(&mut self, problem: &Problem, model: &CostModel, step: f64, longest: f64) {
+    /// Adds every free entry straight into the goal of `problem` whose length is `offset`
+    /// plus a multiple of `step`, more than 0 and at most `longest`, all in metres.
+    pub fn add_straights(
+        &mut self,
+        problem: &Problem,
+        model: &CostModel,
+        offset: f64,
+        step: f64,
+        longest: f64,
+    ) {
+        let lengths = (0..).map(|i| offset + f64::from(i) * step).filter(|l| *l > 0.0);
         for gear in problem.entry_gears() {
-            for i in 1..=(longest / step + 1e-9) as usize {
-                let entry = Segment::straight(gear.sign() * i as f64 * step);
+            for length in lengths.clone().take_while(|l| *l <= longest + 1e-9) {
+                let entry = Segment::straight(gear.sign() * length);
                 let outward = entry.reversed();
                 if !problem.collision.segment_is_free(self.pose, outward) {
                     break;

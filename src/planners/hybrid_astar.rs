@@ -164,11 +164,25 @@ impl HybridAStar {
     /// The goal of `problem` with the entry straights that are free.
     pub(crate) fn goal_set(&self, problem: &Problem) -> GoalSet {
         let mut goal = GoalSet::single(problem.goal);
-        if self.config.entry_straight {
-            let c = &self.config;
-            goal.add_straights(problem, &c.cost, c.entry_step, c.entry_max);
+        self.add_straights(problem, 0.0, &mut goal);
+        goal
+    }
+
+    /// [`HybridAStar::goal_set`] that also has the entries of a cell whose goal lies `shift`
+    /// metres further out.
+    pub(crate) fn goal_set_of_cell(&self, problem: &Problem, shift: f64) -> GoalSet {
+        let mut goal = self.goal_set(problem);
+        if shift > 0.0 {
+            self.add_straights(problem, shift, &mut goal);
         }
         goal
+    }
+
+    fn add_straights(&self, problem: &Problem, offset: f64, goal: &mut GoalSet) {
+        let c = &self.config;
+        if c.entry_straight {
+            goal.add_straights(problem, &c.cost, offset, c.entry_step, c.entry_max);
+        }
     }
 
     /// The cheapest free way from `from` into `goal`, without any search.

@@ -98,8 +98,8 @@ impl Problem {
     }
 
     /// Gears in which a straight may enter the spot: the goal of a bay is the *set* of
-    /// poses from which a straight leads to the parked pose. Empty for parallel spots;
-    /// both where the kind of spot is unknown.
+    /// poses from which a straight leads to the parked pose. Both gears for parallel spots,
+    /// where a car backs in and pulls forward, and where the kind of spot is unknown.
     pub fn entry_gears(&self) -> &'static [Gear] {
         match self.kind {
             Some(ParkingType::Forward) => &[Gear::Forward],

@@ -93,7 +93,7 @@ impl GuidedPlanner {
         let before = *left;
         let Leg { mut path, .. } =
             self.hars.leg(problem, problem.start, &GoalSet::single(pose), left).ok()?;
-        let goal = self.hars.goal_set(problem);
+        let goal = self.hars.goal_set_of_cell(problem, found.shift);
         let second = self.hars.leg(problem, pose, &goal, left).ok()?;
         path.extend(second.path.segments);
         let route = if *left == before { Route::Direct } else { Route::Searched };
@@ -110,8 +110,9 @@ impl GuidedPlanner {
         let mut goal = plain.clone();
         for found in found.iter().take(ABSTRACTIONS) {
             self.select(problem, found, CANDIDATES);
+            let of_cell = self.hars.goal_set_of_cell(problem, found.shift);
             for i in 0..self.proposals.len() {
-                let Some((pose, rest)) = self.rest_of(problem, i, &plain) else { continue };
+                let Some((pose, rest)) = self.rest_of(problem, i, &of_cell) else { continue };
                 let cost = self.hars.config().cost;
                 goal.add_preparatory(pose, rest, &problem.vehicle, &cost);
             }
