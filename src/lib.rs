@@ -3,6 +3,8 @@
 //! The modules in reading order; each uses those above it, never one below.
 //!
 //! - [`rng`]: one seed, many named random streams
+//! - [`files`]: files that are whole or absent, and plain words for what fails
+//! - [`progress`]: progress bars
 //! - [`geometry`]: poses, frames, polygons
 //! - [`vehicle`]: dimensions, footprint, kinematics
 //! - [`curves`]: segments, paths, Reeds-Shepp words
@@ -13,7 +15,7 @@
 //! - [`training`]: rows → artefacts
 //! - [`evaluation`]: episodes, the independent oracle, tables, reports
 //! - [`experiments`]: a whole pipeline from one versioned file
-//! - [`cli`]: what the binaries share
+//! - [`cli`]: arguments, output and exit codes of the binaries
 
 #![warn(missing_docs)]
 
@@ -22,8 +24,10 @@ pub mod curves;
 pub mod dataset;
 pub mod evaluation;
 pub mod experiments;
+pub mod files;
 pub mod geometry;
 pub mod planners;
+pub mod progress;
 pub mod rng;
 pub mod selectors;
 pub mod training;

@@ -436,9 +436,9 @@ fn the_command_refuses_bad_input_before_training() {
     refused(&[&parallel[..], &["--config", "bad.toml"]].concat(), "`epoch`");
     refused(
         &[&parallel[..], &["--out", "file/m.safetensors"]].concat(),
-        "cannot write to the folder file",
+        "m.safetensors: cannot be written",
     );
-    refused(&["knn", "--out", "file/knn.bin"], "cannot write to the folder file");
+    refused(&["knn", "--out", "file/knn.bin"], "file/knn.bin: cannot be written");
     refused(&["knn", "--data", "nowhere"], "nowhere");
     refused(&["mlp", "--out", "m.safetensors"], "--type");
 }

@@ -7,13 +7,14 @@
 
 use std::collections::HashSet;
 use std::fs;
-use std::io::{self, ErrorKind, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, error::Category};
 
 use super::{Obstacles, ParkingType, tpcap};
+use crate::files::{reason, write_whole};
 use crate::geometry::{Polygon, Pose, Vec2};
 use crate::vehicle::Vehicle;
 
@@ -84,17 +85,6 @@ pub enum SceneError {
         /// with the field.
         message: String,
     },
-}
-
-/// The operating system's reason in plain words, without its error number.
-fn reason(error: &io::Error) -> String {
-    match error.kind() {
-        ErrorKind::NotFound => "no such file or folder".to_owned(),
-        ErrorKind::PermissionDenied => "permission denied".to_owned(),
-        ErrorKind::IsADirectory => "it is a folder, not a file".to_owned(),
-        ErrorKind::NotADirectory => "it is a file, not a folder".to_owned(),
-        _ => error.to_string(),
-    }
 }
 
 impl Scene {
@@ -169,21 +159,7 @@ impl Scene {
         self.validate(path)?;
         let error = |error| SceneError::Write { path: path.to_owned(), error };
         let json = serde_json::to_string(self).map_err(|e| error(e.into()))?;
-        let mut name = path.file_name().unwrap_or_default().to_owned();
-        name.push(".tmp");
-        let temporary = path.with_file_name(name);
-        let written = fs::File::create(&temporary)
-            .and_then(|mut file| {
-                file.write_all(json.as_bytes())?;
-                file.write_all(b"\n")?;
-                file.sync_all()
-            })
-            .and_then(|()| fs::rename(&temporary, path));
-        written.map_err(|e| {
-            // The first error is the one to report; a leftover is no worse than that.
-            let _ = fs::remove_file(&temporary);
-            error(e)
-        })
+        write_whole(path, (json + "\n").as_bytes()).map_err(error)
     }
 
     /// Checks every number. `path` is where the scene comes from, for the message.
