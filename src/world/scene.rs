@@ -92,6 +92,13 @@ impl Scene {
     /// what the collision check relies on.
     pub const MAX_COORDINATE: f64 = 1e7;
 
+    /// Largest straight distance between start and goal, metres: paths are sampled and
+    /// checked every few centimetres.
+    pub const MAX_DISTANCE: f64 = 1e4;
+
+    /// Longest name as part of a file name, bytes: leaves room for `.METHOD.json`.
+    pub const MAX_NAME: usize = 200;
+
     /// Reads one scene from `.json` (the scene format) or `.csv` (TPCAP) and validates it.
     /// A scene without a name gets its file's.
     pub fn read(path: &Path) -> Result<Scene, SceneError> {
@@ -179,12 +186,30 @@ impl Scene {
             };
             invalid(field(), format!("= {values:?} {message}"))
         };
+        if let Some(c) = self.name.chars().find(|c| c.is_control()) {
+            let message = format!("holds the control character {c:?}; expected plain text");
+            return invalid("name".to_owned(), message);
+        }
+        let length = self.file_stem().len();
+        if length > Self::MAX_NAME {
+            let message =
+                format!("needs {length} bytes in a file name; expected at most {}", Self::MAX_NAME);
+            return invalid("name".to_owned(), message);
+        }
         if let Err(e) = self.vehicle.validate() {
             let message = format!("is {}; it must be {}", e.value, e.expected);
             return invalid(format!("vehicle.{}", e.field), message);
         }
         numbers(&|| "start".to_owned(), &<[f64; 3]>::from(self.start))?;
         numbers(&|| "goal".to_owned(), &<[f64; 3]>::from(self.goal))?;
+        let distance = self.start.distance(self.goal);
+        if distance > Self::MAX_DISTANCE {
+            let message = format!(
+                "lies {distance:.0} m from the goal; expected at most {} m",
+                Self::MAX_DISTANCE
+            );
+            return invalid("start".to_owned(), message);
+        }
         for (i, polygon) in self.obstacles.iter().enumerate() {
             for (j, vertex) in polygon.iter().enumerate() {
                 numbers(&|| format!("obstacles[{i}][{j}]"), vertex)?;
@@ -214,11 +239,20 @@ impl Scene {
         Ok(())
     }
 
-    /// The name with everything replaced by `_` that does not belong into a file name.
+    /// The name as part of a file name, where no two names meet: what does not belong there
+    /// is written as `%` and the hexadecimal digits of its bytes.
     pub fn file_stem(&self) -> String {
-        let safe = |c: char| if c.is_alphanumeric() || "-_.@+ ".contains(c) { c } else { '_' };
-        let stem: String = self.name.chars().map(safe).collect();
-        if stem.starts_with('.') { format!("_{stem}") } else { stem }
+        let mut stem = String::new();
+        for c in self.name.chars() {
+            let hidden = c == '.' && stem.is_empty();
+            if (c.is_alphanumeric() || "-_.@+ ".contains(c)) && !hidden {
+                stem.push(c);
+            } else {
+                let mut buffer = [0; 4];
+                stem.extend(c.encode_utf8(&mut buffer).bytes().map(|b| format!("%{b:02X}")));
+            }
+        }
+        stem
     }
 
     /// The obstacles as geometry, in the scene's frame. Call after [`Scene::validate`].
