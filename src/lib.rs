@@ -1,6 +1,16 @@
 //! N3P: automated parking with a learned preparatory pose.
 //!
-//! The modules in reading order; each uses those above it, never one below.
+//! The car drives to a *preparatory pose* that a model chose near the spot, and parks from
+//! there along one Reeds-Shepp curve. This crate collects the data, trains the models, plans,
+//! and evaluates.
+//!
+//! A scene becomes a [`planners::Problem`]; a [`planners::Planner`] turns it into a
+//! [`curves::Path`]. N3P itself is [`selectors::guided::GuidedPlanner`]. `examples/plan_scene.rs`
+//! shows the three together on one page. Metres, radians, counter-clockwise; a pose is that of
+//! the rear-axle centre.
+//!
+//! The modules in reading order; each uses those above it, never one below (but [`cli`], whose
+//! progress bar serves long tasks everywhere).
 //!
 //! - [`rng`]: one seed, many named random streams
 //! - [`files`]: files that are whole or absent, and plain words for what fails

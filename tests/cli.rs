@@ -220,8 +220,8 @@ fn a_wrong_experiment_is_refused() {
         ("epochs", "epoks", &["x.toml", "line", "epoks"][..]),
         ("version = 1", "version = 9", &["version is 9"]),
         ("\"ha-rs\"", "\"ha-xx\"", &["ha-xx", "ha-rs"]),
-        ("samples_per_cell = 30", "samples_per_cell = 0", &["collect", "samples_per_cell is 0"]),
-        ("samples_per_cell = 30", "seed = 4", &["collect.seed", "at the top"]),
+        ("samples_per_cell = 25", "samples_per_cell = 0", &["collect", "samples_per_cell is 0"]),
+        ("samples_per_cell = 25", "seed = 4", &["collect.seed", "at the top"]),
     ] {
         assert!(text.contains(old), "{old}");
         std::fs::write(dir.path().join("x.toml"), text.replacen(old, new, 1)).unwrap();

@@ -35,6 +35,7 @@ fn metadata() -> Metadata {
         grid,
         planner: HybridAStarConfig::default(),
         max_expansions: 1000,
+        solutions: 1,
         samples_per_cell: 50,
         start_heading_max: 0.5,
         cells_per_shard: 4,

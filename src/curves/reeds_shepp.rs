@@ -191,7 +191,8 @@ fn base_words(g: UnitGoal, put: &mut impl FnMut(&[Turn], &[f64])) {
 }
 
 fn polar(x: f64, y: f64) -> (f64, f64) {
-    (x.hypot(y), y.atan2(x))
+    // Lengths here are neither huge nor tiny: no need for hypot's scaling.
+    ((x * x + y * y).sqrt(), y.atan2(x))
 }
 
 fn mod2pi(a: f64) -> f64 {
@@ -251,7 +252,7 @@ fn tau_omega(u: f64, v: f64, xi: f64, eta: f64, phi: f64) -> (f64, f64) {
 /// L⁺R⁺ᵤL⁻ᵤR⁻, eq. 8.7.
 fn lr_u_lr(g: UnitGoal) -> Option<(f64, f64, f64)> {
     let (xi, eta) = (g.x + g.sin, g.y - 1.0 - g.cos);
-    let rho = 0.25 * (2.0 + xi.hypot(eta));
+    let rho = 0.25 * (2.0 + (xi * xi + eta * eta).sqrt());
     if rho > 1.0 {
         return None;
     }

@@ -24,6 +24,8 @@ pub struct CollectConfig {
     pub planner: HybridAStarConfig,
     /// Expansion budget per sample, 1 to 10⁹.
     pub max_expansions: usize,
+    /// Solutions of a sample's search to choose the cheapest from, 1 to 10⁶.
+    pub solutions: u32,
     /// Samples per cell, 1 to 10⁶.
     pub samples_per_cell: u32,
     /// Start headings are uniform in ± this angle, radians, 0 to π.
@@ -41,6 +43,7 @@ impl Default for CollectConfig {
             grid: Grid::default(),
             planner: HybridAStarConfig::default(),
             max_expansions: 50_000,
+            solutions: 20,
             samples_per_cell: 100,
             start_heading_max: PI / 3.0,
             cells_per_shard: 16,
@@ -79,6 +82,7 @@ impl CollectConfig {
         self.planner.validate().map_err(|e| bad(format!("planner.{e}")))?;
         for (field, value, max) in [
             ("max_expansions", self.max_expansions as u64, 1_000_000_000),
+            ("solutions", self.solutions.into(), 1_000_000),
             ("samples_per_cell", self.samples_per_cell.into(), 1_000_000),
             ("cells_per_shard", self.cells_per_shard.into(), Self::MAX_SHARD_ROWS),
         ] {
@@ -108,6 +112,7 @@ impl CollectConfig {
             grid: self.grid,
             planner: self.planner,
             max_expansions: self.max_expansions,
+            solutions: self.solutions,
             samples_per_cell: self.samples_per_cell,
             start_heading_max: self.start_heading_max,
             cells_per_shard: self.cells_per_shard,

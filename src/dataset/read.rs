@@ -356,7 +356,7 @@ fn primitive<'a, T: ArrowPrimitiveType>(
 }
 
 fn check_finite(sample: &Sample) -> Result<(), String> {
-    let started = sample.status != Status::NoStart;
+    let started = !matches!(sample.status, Status::NoStart | Status::GivenUp);
     if started && !sample.start.is_finite() {
         return Err(format!("start is {:?}; expected finite numbers", sample.start));
     }

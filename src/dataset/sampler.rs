@@ -11,6 +11,10 @@ use crate::rng::{Stream, rng};
 use crate::world::ParkingType;
 use crate::world::cell::Cell;
 
+/// A cell none of whose first samples is solved is given up: in most such cells the car
+/// cannot park at all, and every further sample would spend its whole budget.
+const PROBES: u32 = 4;
+
 /// Draws per sample before the cell counts as having no free start.
 const MAX_DRAWS: usize = 200;
 
@@ -28,22 +32,54 @@ struct CellProblem {
     index: u32,
     /// `None` when the car does not fit the spot.
     problem: Option<Problem>,
+    /// The first samples, once solved.
+    probes: Vec<Sample>,
+}
+
+impl CellProblem {
+    fn is_hopeless(&self) -> bool {
+        self.probes.len() == PROBES as usize
+            && self.probes.iter().all(|s| s.status != Status::Solved)
+    }
 }
 
 impl<'a> Sampler<'a> {
     /// A sampler with `config`, which must be valid.
     pub fn new(config: &'a CollectConfig) -> Self {
-        Self { config, planner: HybridAStar::new(config.planner), current: None }
+        Self {
+            config,
+            planner: HybridAStar::hold(config.planner, config.solutions as usize),
+            current: None,
+        }
     }
 
     /// The sample `sample_index` of the cell `cell_index`.
     pub fn sample(&mut self, kind: ParkingType, cell_index: u32, sample_index: u32) -> Sample {
         let config = self.config;
         let known = self.current.take().filter(|c| c.index == cell_index && c.cell.kind == kind);
-        let here = self
-            .current
-            .insert(known.unwrap_or_else(|| CellProblem::new(config, kind, cell_index)));
+        let mut here = known.unwrap_or_else(|| CellProblem::new(config, kind, cell_index));
+        // The probes are solved whichever sample is asked for first, so that a sample does
+        // not depend on that.
+        for i in here.probes.len() as u32..PROBES.min(config.samples_per_cell) {
+            let probe = self.solve(&mut here, i);
+            here.probes.push(probe);
+        }
+        let sample = match here.probes.get(sample_index as usize) {
+            Some(probe) => probe.clone(),
+            None if here.is_hopeless() => {
+                let nowhere = Pose::new(f64::NAN, f64::NAN, f64::NAN);
+                let (cell, status) = (here.cell, Status::GivenUp);
+                Sample::unsolved(cell, cell_index, sample_index, nowhere, status, config.seed)
+            }
+            None => self.solve(&mut here, sample_index),
+        };
+        self.current = Some(here);
+        sample
+    }
 
+    fn solve(&mut self, here: &mut CellProblem, sample_index: u32) -> Sample {
+        let config = self.config;
+        let (kind, cell_index) = (here.cell.kind, here.index);
         let unsolved = |start, status| {
             Sample::unsolved(here.cell, cell_index, sample_index, start, status, config.seed)
         };
@@ -83,7 +119,7 @@ impl CellProblem {
         // The goal stands in as start: with it, only a spot too narrow for the car fails.
         let goal = config.grid.goal(kind, &config.vehicle);
         let problem = Problem::in_cell(&config.grid, &cell, config.vehicle, goal).ok();
-        Self { cell, index, problem }
+        Self { cell, index, problem, probes: Vec::new() }
     }
 }
 

@@ -28,14 +28,22 @@ pub enum Status {
     NoPath,
     /// A path was found, but no pose along it is one curve away from the goal.
     NoCurve,
+    /// Not tried: none of the first samples of the cell was solved.
+    GivenUp,
     /// No free start pose was found in the cell (or its goal is not free).
     NoStart,
 }
 
 impl Status {
     /// Every status.
-    pub const ALL: [Status; 5] =
-        [Self::Solved, Self::BudgetSpent, Self::NoPath, Self::NoCurve, Self::NoStart];
+    pub const ALL: [Status; 6] = [
+        Self::Solved,
+        Self::BudgetSpent,
+        Self::NoPath,
+        Self::NoCurve,
+        Self::GivenUp,
+        Self::NoStart,
+    ];
 
     /// The name used in the files.
     pub fn name(self) -> &'static str {
@@ -44,6 +52,7 @@ impl Status {
             Self::BudgetSpent => "budget_spent",
             Self::NoPath => "no_path",
             Self::NoCurve => "no_curve",
+            Self::GivenUp => "given_up",
             Self::NoStart => "no_start",
         }
     }
@@ -57,7 +66,7 @@ impl Status {
 /// One solved (or failed) sample: one row.
 ///
 /// Unsolved rows have NaN in every column that a path would fill; rows of
-/// [`Status::NoStart`] have NaN starts as well.
+/// [`Status::NoStart`] and [`Status::GivenUp`] have NaN starts as well.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sample {
     /// The environment, parking type included.
@@ -226,6 +235,8 @@ pub struct Metadata {
     pub planner: HybridAStarConfig,
     /// Expansion budget per sample.
     pub max_expansions: usize,
+    /// Solutions of a search to choose the cheapest from.
+    pub solutions: u32,
     /// Samples per cell.
     pub samples_per_cell: u32,
     /// Start headings are uniform in ± this angle, radians.

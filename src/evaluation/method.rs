@@ -57,7 +57,10 @@ pub enum MethodError {
     NotAvailable(Method),
 }
 
-const AVAILABLE: &str = "ha-rs, mlp-n3p, knn-n3p, n3p";
+const AVAILABLE: &str = "ha-rs, ha-hold, mlp-n3p, knn-n3p, n3p";
+
+/// How many solutions the paper's HA* Hold compares.
+const HOLD_SOLUTIONS: usize = 5;
 
 impl Method {
     /// All methods, in the order of the paper's tables, ours last.
@@ -132,6 +135,7 @@ impl Method {
         let selector = models.selector(self);
         match self {
             Self::HaRs => Ok(Box::new(HybridAStar::new(*config))),
+            Self::HaHold => Ok(Box::new(HybridAStar::hold(*config, HOLD_SOLUTIONS))),
             Self::KnnN3p => {
                 let selector = selector.ok_or_else(|| no_model("knn", "knn.bin"))?;
                 Ok(Box::new(GuidedPlanner::paper(self.name(), selector, *config)))
@@ -144,7 +148,7 @@ impl Method {
                 let selector = selector.ok_or_else(|| no_model("knn", "knn.bin"))?;
                 Ok(Box::new(GuidedPlanner::ranked(self.name(), selector, *config)))
             }
-            Self::Ha | Self::HaHold | Self::Mhha | Self::Sha | Self::RlSimple | Self::RlEval => {
+            Self::Ha | Self::Mhha | Self::Sha | Self::RlSimple | Self::RlEval => {
                 Err(MethodError::NotAvailable(self))
             }
         }
@@ -203,6 +207,6 @@ mod tests {
         assert!(message.contains("--model") && message.contains("n3p-train knn"), "{message}");
         let message = build(Method::Sha).err().unwrap().to_string();
         assert!(message.contains("not available in this version"), "{message}");
-        assert_eq!(Method::available(&Models::default()), [Method::HaRs]);
+        assert_eq!(Method::available(&Models::default()), [Method::HaRs, Method::HaHold]);
     }
 }

@@ -159,6 +159,8 @@ pub(crate) struct Connection<'a> {
     pub entry: &'a Entry,
     /// Its index in the goal set.
     pub entry_index: usize,
+    /// Cost of curve and rest.
+    pub cost: f64,
 }
 
 impl Connection<'_> {
@@ -188,23 +190,25 @@ impl AnalyticExpansion {
             self.add(from, entry.pose, entry.departure, entry.cost, i, &problem.vehicle, model);
         }
         let c = self.cheapest_free(from, problem)?;
-        let (entry, entry_index) = (&goal.entries[c.target], c.target);
-        Some(Connection { from, word: c.word, entry, entry_index })
+        let (entry, entry_index, cost) = (&goal.entries[c.target], c.target, c.cost);
+        Some(Connection { from, word: c.word, entry, entry_index, cost })
     }
 
     /// The cheapest free curve from the free pose `from` to `to`, where the way goes on with
-    /// `departure`.
+    /// `departure`, and its cost, which is less than `bound`.
     pub fn curve(
         &mut self,
         from: Pose,
         to: Pose,
         departure: DriveState,
+        bound: f64,
         problem: &Problem,
         model: &CostModel,
-    ) -> Option<Word> {
+    ) -> Option<(Word, f64)> {
         self.candidates.clear();
         self.add(from, to, departure, 0.0, 0, &problem.vehicle, model);
-        self.cheapest_free(from, problem).map(|c| c.word)
+        self.candidates.retain(|c| c.cost < bound);
+        self.cheapest_free(from, problem).map(|c| (c.word, c.cost))
     }
 
     /// Adds all words to one target as candidates.

@@ -122,27 +122,38 @@ impl HybridAStarConfig {
     }
 }
 
-/// Hybrid A* with Reeds-Shepp expansion: the method `ha-rs`.
+/// Hybrid A* with Reeds-Shepp expansion: the methods `ha-rs` and `ha-hold`.
 #[derive(Debug)]
 pub struct HybridAStar {
     config: HybridAStarConfig,
+    /// Solutions to look at before the cheapest is returned.
+    solutions: usize,
     queue: Search,
     analytic: AnalyticExpansion,
 }
 
 /// What one search found.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Leg {
     /// The path from the leg's start to its goal.
     pub path: Path,
+    /// Its cost.
+    pub cost: f64,
     /// The goal-set entry it goes through.
     pub entry: usize,
 }
 
 impl HybridAStar {
-    /// A planner with `config`; buffers grow at first use.
+    /// `ha-rs`: the first solution found. Buffers grow at first use.
     pub fn new(config: HybridAStarConfig) -> Self {
-        Self { config, queue: Search::default(), analytic: AnalyticExpansion::default() }
+        Self::hold(config, 1)
+    }
+
+    /// The cheapest of the first `solutions` found (fewer where nothing cheaper can follow);
+    /// with five the paper's HA* Hold, the method `ha-hold`.
+    pub fn hold(config: HybridAStarConfig, solutions: usize) -> Self {
+        let (queue, analytic) = (Search::default(), AnalyticExpansion::default());
+        Self { config, solutions: solutions.max(1), queue, analytic }
     }
 
     /// The settings.
@@ -179,53 +190,62 @@ impl HybridAStar {
         goal: &GoalSet,
         expansions: &mut usize,
     ) -> Result<Leg, NoPath> {
-        match self.direct(problem, start, goal) {
-            Some(leg) => Ok(leg),
-            None => self.search(problem, start, goal, expansions),
+        let direct = self.direct(problem, start, goal);
+        match direct {
+            Some(leg) if self.solutions == 1 => Ok(leg),
+            _ => self.search(problem, start, goal, direct, expansions),
         }
     }
 
     /// A leg that is one curve and the rest of an entry.
     pub(crate) fn direct(&mut self, problem: &Problem, start: Pose, goal: &GoalSet) -> Option<Leg> {
         let c = self.connect(problem, start, goal)?;
-        Some(Leg { path: Path::new(start, c.segments()), entry: c.entry_index })
+        Some(Leg { path: Path::new(start, c.segments()), cost: c.cost, entry: c.entry_index })
     }
 
-    /// [`HybridAStar::leg`] where no curve leads from `start` to `goal` directly.
+    /// [`HybridAStar::leg`] beyond the `direct` solution, if there is one.
     pub(crate) fn search(
         &mut self,
         problem: &Problem,
         start: Pose,
         goal: &GoalSet,
+        direct: Option<Leg>,
         expansions: &mut usize,
     ) -> Result<Leg, NoPath> {
+        let mut best = direct;
         let mut result = Err(NoPath::BudgetSpent);
         for (i, resolution) in self.config.resolutions.into_iter().enumerate() {
             // Finer lattices are left their share even when a coarse one goes on and on.
             let last = i + 1 == self.config.resolutions.len();
             let reserve = if last { 0 } else { *expansions / 2 };
             *expansions -= reserve;
-            result = self.search_leg(&resolution, problem, start, goal, expansions);
+            result = self.search_leg(&resolution, problem, start, goal, &mut best, expansions);
             *expansions += reserve;
-            if !matches!(result, Err(NoPath::Exhausted | NoPath::BudgetSpent)) {
+            if best.is_some() || result == Err(NoPath::Enclosed) {
                 break;
             }
         }
-        result
+        best.map_or_else(|| Err(result.err().unwrap_or(NoPath::Exhausted)), Ok)
     }
 
-    /// One search at one resolution.
+    /// One search at one resolution, for something cheaper than `best`.
     fn search_leg(
         &mut self,
         resolution: &Resolution,
         problem: &Problem,
         start: Pose,
         goal: &GoalSet,
+        best: &mut Option<Leg>,
         expansions: &mut usize,
-    ) -> Result<Leg, NoPath> {
+    ) -> Result<(), NoPath> {
+        let mut wanted = self.solutions - usize::from(best.is_some());
         let domain = self.domain(problem, start, goal.pose);
         self.queue.begin(&self.config, resolution, problem, domain, start, goal);
         while let Some(node) = self.queue.pop() {
+            let bound = best.as_ref().map_or(f64::INFINITY, |leg| leg.cost);
+            if self.queue.estimate(node) >= bound {
+                return Ok(());
+            }
             if *expansions == 0 {
                 return Err(NoPath::BudgetSpent);
             }
@@ -233,12 +253,19 @@ impl HybridAStar {
             if self.queue.wants_curve(node) {
                 let departure = self.queue.departure(node, goal);
                 let (to, model) = (self.queue.pose(node), &self.config.cost);
-                if let Some(word) = self.analytic.curve(start, to, departure, problem, model) {
+                let way_cost = self.queue.cost(node);
+                let bound = bound - way_cost;
+                let curve = self.analytic.curve(start, to, departure, bound, problem, model);
+                if let Some((word, cost)) = curve {
                     let (way, entry) = self.queue.way(node);
                     let mut path = Path::new(start, word.segments().iter().copied());
                     path.extend(way);
                     path.extend(goal.entries()[entry].rest.iter().copied());
-                    return Ok(Leg { path, entry });
+                    *best = Some(Leg { path, cost: way_cost + cost, entry });
+                    wanted -= 1;
+                    if wanted == 0 {
+                        return Ok(());
+                    }
                 }
             }
             self.queue.expand(node, goal, &self.config, problem);
@@ -324,7 +351,7 @@ impl HybridAStar {
 
 impl Planner for HybridAStar {
     fn name(&self) -> &str {
-        "ha-rs"
+        if self.solutions == 1 { "ha-rs" } else { "ha-hold" }
     }
 
     fn plan(&mut self, problem: &Problem, budget: Budget) -> PlanResult {

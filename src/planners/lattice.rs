@@ -48,6 +48,8 @@ impl Lattice {
     }
 
     /// The state of a pose; `None` outside the domain. Allocates its tile.
+    ///
+    /// The heading must lie in [−2π, 2π].
     pub fn state(&mut self, pose: Pose) -> Option<StateIndex> {
         let x = (pose.x - self.origin.0) * self.inverse_cell;
         let y = (pose.y - self.origin.1) * self.inverse_cell;
@@ -58,7 +60,8 @@ impl Lattice {
         if x >= self.size.0 || y >= self.size.1 {
             return None;
         }
-        let turn = (pose.heading / TAU).rem_euclid(1.0);
+        debug_assert!(pose.heading.abs() <= TAU);
+        let turn = pose.heading / TAU + 1.0;
         let heading = (turn * self.headings as f64 + 0.5) as usize % self.headings;
         let tile = &mut self.tile_of[y / TILE * self.tiles_x + x / TILE];
         let states = TILE * TILE * self.headings;

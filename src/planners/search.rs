@@ -11,7 +11,7 @@ use std::collections::BinaryHeap;
 use crate::curves::Segment;
 use crate::geometry::{Aabb, Pose, wrap_angle};
 use crate::vehicle::{Gear, Vehicle};
-use crate::world::collision::Sweep;
+use crate::world::collision::{BodyFrame, Sweep};
 
 use super::Problem;
 use super::analytic::GoalSet;
@@ -77,6 +77,8 @@ struct Primitive {
     segment: Segment,
     /// What the reversed motion sweeps.
     sweep: Sweep,
+    /// Where the reversed motion ends, seen from where it begins.
+    end: Pose,
     /// Its steering angle, radians.
     steer: f64,
 }
@@ -125,13 +127,14 @@ impl Search {
             return;
         }
         for (i, entry) in goal.entries().iter().enumerate() {
-            let to_come = self.heuristic(entry.pose, vehicle, &config.cost);
-            let Some(state) = self.lattice.state(entry.pose) else { continue };
+            let pose = Pose { heading: wrap_angle(entry.pose.heading), ..entry.pose };
+            let to_come = self.heuristic(pose, vehicle, &config.cost);
+            let Some(state) = self.lattice.state(pose) else { continue };
             let cost = entry.cost() as f32;
             if to_come.is_finite() && cost < self.lattice.cost(state) {
                 self.lattice.set_cost(state, cost);
                 let parent = i as NodeIndex;
-                self.push(Node { pose: entry.pose, cost, to_come, parent, primitive: ROOT });
+                self.push(Node { pose, cost, to_come, parent, primitive: ROOT });
             }
         }
     }
@@ -148,7 +151,8 @@ impl Search {
                 };
                 // Swept in reverse: from the node it leads to.
                 let sweep = Sweep::new(footprint, segment.reversed());
-                self.primitives.push(Primitive { segment, sweep, steer });
+                let end = segment.reversed().end(Pose::default());
+                self.primitives.push(Primitive { segment, sweep, end, steer });
             }
         }
     }
@@ -182,6 +186,17 @@ impl Search {
         wants
     }
 
+    /// Cost from `node` to the goal.
+    pub fn cost(&self, node: NodeIndex) -> f64 {
+        f64::from(self.nodes[node as usize].cost)
+    }
+
+    /// Estimated cost of a whole path through `node`.
+    pub fn estimate(&self, node: NodeIndex) -> f64 {
+        let n = &self.nodes[node as usize];
+        f64::from(n.cost + n.to_come)
+    }
+
     /// The pose of `node`.
     pub fn pose(&self, node: NodeIndex) -> Pose {
         self.nodes[node as usize].pose
@@ -206,16 +221,18 @@ impl Search {
     ) {
         let parent = self.nodes[node as usize];
         let state = self.departure(node, goal);
+        let frame = BodyFrame::new(parent.pose);
         for i in 0..self.primitives.len() {
             let p = &self.primitives[i];
-            let pose = p.sweep.segment().end(parent.pose);
-            let pose = Pose { heading: wrap_angle(pose.heading), ..pose };
+            let position = frame.parent(p.end.position());
+            let heading = wrap_angle(parent.pose.heading + p.end.heading);
+            let pose = Pose::new(position.x, position.y, heading);
             // Costs of changes are symmetric: the state after may stand for the one before.
             let (step_cost, _) = config.cost.segment(state, p.segment.length, p.steer);
             let cost = parent.cost + step_cost as f32;
             let Some(lattice_state) = self.lattice.state(pose) else { continue };
             if cost >= self.lattice.cost(lattice_state)
-                || !problem.collision.sweep_is_free(parent.pose, &p.sweep)
+                || !problem.collision.sweep_is_free(&frame, &p.sweep)
             {
                 continue;
             }

@@ -19,7 +19,7 @@ use crate::world::abstraction::{Abstraction, abstractions};
 use super::{Features, PoseSelector, Proposal};
 
 /// How many ranked poses `n3p` asks for in each abstraction.
-const CANDIDATES: usize = 8;
+const CANDIDATES: usize = 12;
 /// How many abstractions `n3p` tries.
 const ABSTRACTIONS: usize = 3;
 /// Expansions that `n3p` spends on the way to the preparatory poses before it searches for
@@ -128,14 +128,14 @@ impl GuidedPlanner {
             let share = (*left).min(APPROACH_EXPANSIONS);
             *left -= share;
             let mut spend = share;
-            let leg = self.hars.search(problem, problem.start, &preparatory, &mut spend);
+            let leg = self.hars.search(problem, problem.start, &preparatory, None, &mut spend);
             *left += spend;
             if let Ok(leg) = leg {
                 let entry = preparatory.entries().get(leg.entry);
                 return Ok((leg.path, guidance(entry, Route::Searched)));
             }
         }
-        let leg = self.hars.search(problem, problem.start, &plain, left)?;
+        let leg = self.hars.search(problem, problem.start, &plain, None, left)?;
         Ok((leg.path, guidance(None, Route::Fallback)))
     }
 

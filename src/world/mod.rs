@@ -1,8 +1,10 @@
 //! The world a car parks in: scenes, collision, cells and the abstraction.
 //!
-//! A [`Scene`] is what a user gives; [`Obstacles`] is its geometry in any frame;
-//! [`collision`] answers whether a motion is free; [`cell`] defines the abstracted
-//! environments 𝓔 of the paper and [`abstraction`] finds them in a scene.
+//! In reading order: a [`Scene`] is what a user gives ([`mod@scene`] reads files, [`mod@tpcap`] a
+//! benchmark's, [`mod@generate`] makes scenes); [`spot`] finds the spot frame that everything
+//! below works in; [`Obstacles`] is a scene's geometry in any frame; [`collision`] answers
+//! whether a motion is free; [`cell`] defines the abstracted environments 𝓔 of the paper and
+//! [`abstraction`] finds them in a scene.
 
 pub mod abstraction;
 pub mod cell;

@@ -31,6 +31,12 @@ impl ConvexBounds {
 
     /// Whether the rear axle stays inside all along `segment`.
     pub fn contains_motion(&self, start: Pose, segment: Segment) -> bool {
+        // Within the length of the motion no side is ever reached.
+        let reach = segment.length.abs();
+        let far = |(n, offset): &(Vec2, f64)| n.dot(&start.position()) + reach <= *offset;
+        if self.sides.iter().all(far) {
+            return true;
+        }
         let end = segment.end(start).position();
         if !(self.contains(start.position()) && self.contains(end)) {
             return false;

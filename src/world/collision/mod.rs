@@ -83,18 +83,17 @@ impl CollisionWorld {
     /// `start` must be free already (see [`CollisionWorld::pose_is_free`]): only contacts
     /// made by moving are looked for.
     pub fn segment_is_free(&self, start: Pose, segment: Segment) -> bool {
-        self.sweep_is_free(start, &Sweep::new(&self.footprint, segment))
+        self.sweep_is_free(&BodyFrame::new(start), &Sweep::new(&self.footprint, segment))
     }
 
     /// [`CollisionWorld::segment_is_free`] with the sweep of this world's footprint
     /// prepared beforehand, as the search does for its motion primitives.
-    pub fn sweep_is_free(&self, start: Pose, sweep: &Sweep) -> bool {
-        if self.bounds.as_ref().is_some_and(|b| !b.contains_motion(start, sweep.segment())) {
+    pub fn sweep_is_free(&self, start: &BodyFrame, sweep: &Sweep) -> bool {
+        if self.bounds.as_ref().is_some_and(|b| !b.contains_motion(start.pose, sweep.segment())) {
             return false;
         }
-        let body = BodyFrame::new(start);
-        let near = body.aabb_of(sweep.aabb());
-        !self.index.any_near(&near, |a, b| sweep.hits(body.local(a), body.local(b)))
+        let near = start.aabb_of(sweep.aabb());
+        !self.index.any_near(&near, |a, b| sweep.hits(start.local(a), start.local(b)))
     }
 
     /// Whether driving all `segments` from the free pose `start` touches nothing.
@@ -119,23 +118,32 @@ impl CollisionWorld {
 }
 
 /// A pose with its sine and cosine, to see obstacles from the vehicle.
-struct BodyFrame {
-    x: f64,
-    y: f64,
+#[derive(Clone, Copy, Debug)]
+pub struct BodyFrame {
+    pose: Pose,
     sin: f64,
     cos: f64,
 }
 
 impl BodyFrame {
-    fn new(pose: Pose) -> Self {
+    /// The vehicle's frame at a rear-axle pose.
+    pub fn new(pose: Pose) -> Self {
         let (sin, cos) = pose.sin_cos();
-        Self { x: pose.x, y: pose.y, sin, cos }
+        Self { pose, sin, cos }
     }
 
+    /// A point of the planning frame, seen from the vehicle.
     #[inline]
-    fn local(&self, p: Vec2) -> Vec2 {
-        let (dx, dy) = (p.x - self.x, p.y - self.y);
+    pub fn local(&self, p: Vec2) -> Vec2 {
+        let (dx, dy) = (p.x - self.pose.x, p.y - self.pose.y);
         Vec2::new(self.cos * dx + self.sin * dy, self.cos * dy - self.sin * dx)
+    }
+
+    /// A point of the vehicle's frame, in the planning frame.
+    #[inline]
+    pub fn parent(&self, p: Vec2) -> Vec2 {
+        let (x, y) = (self.cos * p.x - self.sin * p.y, self.sin * p.x + self.cos * p.y);
+        Vec2::new(self.pose.x + x, self.pose.y + y)
     }
 
     /// The smallest axis-aligned box of the parent frame around a box of the body frame.
@@ -144,8 +152,8 @@ impl BodyFrame {
         let half = (local.max - local.min) * 0.5;
         let (s, c) = (self.sin.abs(), self.cos.abs());
         let (hx, hy) = (c * half.x + s * half.y, s * half.x + c * half.y);
-        let x = self.x + self.cos * center.x - self.sin * center.y;
-        let y = self.y + self.sin * center.x + self.cos * center.y;
-        Aabb::new(x - hx, y - hy, x + hx, y + hy)
+        let center = self.parent(center);
+        let reach = Vec2::new(hx, hy);
+        Aabb { min: center - reach, max: center + reach }
     }
 }

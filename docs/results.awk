@@ -1,0 +1,29 @@
+# The short results table of README.md from an n3p-eval report:
+#   awk -f docs/results.awk target/results/report.md
+# Mean planning times in ms, the paper's in parentheses; the report has everything else.
+function trim(s) { gsub(/^ +| +$/, "", s); return s }
+function cell(method, paper,   ours) {
+  ours = mean[level, kind, method]
+  if (ours == "") return "–"
+  paper = mean[level, kind, paper]
+  return paper == "" ? ours : ours " (" paper ")"
+}
+BEGIN { FS = "|" }
+/^## Level / { level = $0; sub(/^## Level /, "", level); sub(/:.*/, "", level) }
+/^## Mean/ { level = "" }
+level != "" && /^\| (forward|parallel|reverse) / {
+  kind = trim($2); name = trim($3)
+  if (!((level, kind) in seen)) { seen[level, kind] = 1; order[++n] = level SUBSEP kind }
+  mean[level, kind, name] = trim($6)
+  if (trim($4) == "this run") failed[level, kind] += trim($11)
+}
+END {
+  print "| level | type | `ha-rs` (HA* with RS) | `mlp-n3p` (MLP-N3P) | `knn-n3p` (KNN-N3P) | `n3p` | failures |"
+  print "|---|---|--:|--:|--:|--:|--:|"
+  for (i = 1; i <= n; i++) {
+    split(order[i], key, SUBSEP); level = key[1]; kind = key[2]
+    printf "| %s | %s | %s | %s | %s | %s | %s |\n", level, kind, cell("ha-rs", "HA* with RS"),
+      cell("mlp-n3p", "MLP-N3P"), cell("knn-n3p", "KNN-N3P"), cell("n3p", ""),
+      failed[level, kind] == 0 ? "none" : failed[level, kind] " %"
+  }
+}
