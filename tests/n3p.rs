@@ -2,8 +2,9 @@
 
 use n3p::curves::Segment;
 use n3p::curves::reeds_shepp::{Word, words};
+use n3p::evaluation::{Method, Models, PathFile, oracle, suite};
 use n3p::geometry::Pose;
-use n3p::planners::Problem;
+use n3p::planners::{Budget, HybridAStarConfig, Problem};
 use n3p::selectors::Features;
 use n3p::selectors::artefact::Model;
 use n3p::vehicle::{Gear, Vehicle};
@@ -70,4 +71,33 @@ fn every_pose_the_knn_selects_has_a_free_curve_in_the_scenes_own_cell() {
         }
     }
     assert!(answered > 900 && answered * 10 > asked * 9, "{answered} of {asked}");
+}
+
+/// Every method that has a model or needs none, on 100 scenes of each type and level: a
+/// path each time, and none that the oracle rejects.
+#[test]
+fn no_method_fails_on_900_scenes() {
+    let models = Models::load(&["models/knn.bin"]).unwrap();
+    let scenes = suite::generated(
+        &models.vehicle().expect("the model knows its vehicle"),
+        &ParkingType::ALL,
+        &Level::ALL,
+        100,
+        900_900,
+    )
+    .unwrap();
+    let methods = [Method::HaRs, Method::KnnN3p, Method::N3p];
+    let mut planners = methods.map(|m| m.build(&models, &HybridAStarConfig::default()).unwrap());
+    for case in &scenes {
+        let problem = Problem::new(&case.scene).unwrap();
+        for planner in &mut planners {
+            let name = format!("{} by {}", case.scene.name, planner.name());
+            let result = planner.plan(&problem, Budget { max_expansions: 200_000 });
+            let path = result.outcome.unwrap_or_else(|reason| panic!("{name}: {reason}"));
+            let file = PathFile::new(&case.scene, &problem.frame, &path, planner.name());
+            if let Err(violation) = oracle::check(&case.scene, &file) {
+                panic!("{name}: {violation}");
+            }
+        }
+    }
 }
