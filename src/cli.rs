@@ -1,13 +1,16 @@
-//! What the binaries share: exit codes, logging, progress bars.
+//! What the binaries share: arguments, output, logging, exit codes.
 //!
 //! Exit codes: 0 done, 1 our bug or I/O, 2 bad input or usage, 3 no path. Errors go to
 //! stderr in one or two plain lines.
 
 use std::fmt::Display;
+use std::io::{self, Write};
 use std::process::ExitCode;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use clap::error::ErrorKind;
 use tracing_subscriber::EnvFilter;
+
+use crate::files::reason;
 
 /// Exit code of a planner that found no path.
 pub const EXIT_NO_PATH: u8 = 3;
@@ -26,6 +29,39 @@ pub trait OrBadInput<T> {
 impl<T, E: Display> OrBadInput<T> for Result<T, E> {
     fn or_bad_input(self) -> anyhow::Result<T> {
         self.map_err(|e| BadInput(e.to_string()).into())
+    }
+}
+
+/// The command line; a wrong one ends the process with exit code 2 and two lines on stderr.
+pub fn parse<A: clap::Parser>() -> A {
+    A::try_parse().unwrap_or_else(|error| {
+        // Help and version are asked for, or all that can be said.
+        if !error.use_stderr()
+            || error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
+        {
+            error.exit();
+        }
+        eprintln!("{}\nFor more information, try '--help'.", in_one_line(&error.to_string()));
+        std::process::exit(2)
+    })
+}
+
+/// A message of clap's without its paragraphs on usage.
+fn in_one_line(message: &str) -> String {
+    let usage = |part: &&str| part.starts_with("Usage:") || part.starts_with("For more");
+    let parts = message.split("\n\n").filter(|part| !usage(part));
+    parts.flat_map(str::split_whitespace).collect::<Vec<_>>().join(" ")
+}
+
+/// Prints `text` and a line break to stdout. A reader that has had enough (`| head`) is no
+/// error.
+pub fn print(text: impl Display) -> anyhow::Result<()> {
+    let mut out = io::stdout().lock();
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
+            Err(anyhow::anyhow!("standard output: {}", reason(&e)))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -48,13 +84,17 @@ pub fn run(body: impl FnOnce() -> anyhow::Result<ExitCode>) -> ExitCode {
     }
 }
 
-/// A progress bar with ETA on stderr; hidden when stderr is not a terminal.
-pub fn progress(len: u64, what: &str) -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(len), ProgressDrawTarget::stderr());
-    let style = "{prefix:>10} [{bar:40}] {pos}/{len} {elapsed} ETA {eta} {msg}";
-    bar.set_style(
-        ProgressStyle::with_template(style).expect("a valid template").progress_chars("=> "),
-    );
-    bar.set_prefix(what.to_owned());
-    bar
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn usage_is_left_out_and_tips_stay() {
+        let message = "error: unexpected argument '--tpye'\n\n  tip: there is '--type'\n\n\
+                       Usage: n3p-eval [OPTIONS]\n\nFor more information, try '--help'.\n";
+        assert_eq!(
+            in_one_line(message),
+            "error: unexpected argument '--tpye' tip: there is '--type'"
+        );
+    }
 }

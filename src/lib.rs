@@ -13,6 +13,8 @@
 //! progress bar serves long tasks everywhere).
 //!
 //! - [`rng`]: one seed, many named random streams
+//! - [`files`]: files that are whole or absent, and plain words for what fails
+//! - [`progress`]: progress bars
 //! - [`geometry`]: poses, frames, polygons
 //! - [`vehicle`]: dimensions, footprint, kinematics
 //! - [`curves`]: segments, paths, Reeds-Shepp words
@@ -23,7 +25,7 @@
 //! - [`training`]: rows → artefacts
 //! - [`evaluation`]: episodes, the independent oracle, tables, reports
 //! - [`experiments`]: a whole pipeline from one versioned file
-//! - [`cli`]: what the binaries share
+//! - [`cli`]: arguments, output and exit codes of the binaries
 
 #![warn(missing_docs)]
 
@@ -32,8 +34,10 @@ pub mod curves;
 pub mod dataset;
 pub mod evaluation;
 pub mod experiments;
+pub mod files;
 pub mod geometry;
 pub mod planners;
+pub mod progress;
 pub mod rng;
 pub mod selectors;
 pub mod training;

@@ -48,6 +48,11 @@ fn bad_scenes_are_refused_with_file_field_and_remedy() {
     refused(&SCENE.replace("[-6, 5.5, 0]", "[-2, 0, 0]"), &["start", "touches an obstacle"]);
     refused(&SCENE.replace("[0, -1.4, 1.57", "[2, -1.4, 1.57"), &["goal", "touches an obstacle"]);
     refused(&SCENE.replace("\"reverse\"", "\"sideways\""), &["sideways", "parallel"]);
+    // Each of these once ended a run late or never, or wrote onto the terminal.
+    refused(&SCENE.replace("[-6, 5.5, 0]", "[-9e6, 5.5, 0]"), &["start", "from the goal"]);
+    refused(&SCENE.replace("\"bay\"", "\"\\u001b[31m\""), &["name", "control character"]);
+    let long = format!("\"{}\"", "x".repeat(300));
+    refused(&SCENE.replace("\"bay\"", &long), &["name", "300 bytes", "at most 200"]);
     refused(&SCENE.replace("\"width\": 1.86", "\"width\": -1"), &["width", "between"]);
 }
 
@@ -242,4 +247,67 @@ fn a_wrong_experiment_is_refused() {
         .assert()
         .success()
         .stdout(contains("x.toml: every stage"));
+}
+
+/// Planning used to come first, the message about the file after it and without a remedy.
+#[test]
+fn files_that_cannot_be_written_are_refused_before_planning() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("s.json"), SCENE).unwrap();
+    for flag in ["--out", "--svg"] {
+        for (path, told) in [("s.json/x", "s.json/x: cannot be written"), (".", "a folder")] {
+            command("n3p-plan", dir.path())
+                .args(["--scene", "s.json", "--method", "ha-rs", flag, path])
+                .assert()
+                .code(2)
+                .stdout("")
+                .stderr(contains(told).and(contains("choose another")));
+        }
+    }
+}
+
+/// Both used to panic.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_closed_pipe_is_no_error_and_a_full_disk_a_plain_one() {
+    use std::process::{Command, Stdio};
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("s.json"), SCENE).unwrap();
+    let plan = |stdout: Stdio| {
+        Command::new(assert_cmd::cargo::cargo_bin("n3p-plan"))
+            .current_dir(dir.path())
+            .args(["--scene", "s.json", "--method", "ha-rs", "--json"])
+            .stdout(stdout)
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap()
+    };
+    let mut closed = plan(Stdio::piped());
+    drop(closed.stdout.take());
+    let output = closed.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), output.stderr), (Some(0), vec![]));
+
+    let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+    let output = plan(full.into()).wait_with_output().unwrap();
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
+    assert_eq!(stderr, "error: standard output: the disk is full\n");
+}
+
+#[test]
+fn wrong_arguments_are_told_in_two_lines() {
+    let dir = tempfile::tempdir().unwrap();
+    for (program, args, told) in [
+        ("n3p-plan", &[][..], "--scene <FILE>"),
+        ("n3p-eval", &["--type", "diagonal"], "forward, reverse, parallel"),
+        ("n3p-eval", &["--seed", "-1"], "unexpected argument '-1'"),
+        ("n3p-eval", &["--count", "1000000000"], "1..=100000"),
+        ("n3p-collect", &["--threads", "99999"], "1024"),
+        ("n3p-eval", &["--methods", "ha-rs,ha-rs"], "ha-rs twice"),
+    ] {
+        let assert = command(program, dir.path()).args(args).assert().code(2).stdout("");
+        let stderr = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+        assert!(stderr.contains(told), "\"{told}\" not in: {stderr}");
+        assert!(stderr.trim().lines().count() <= 2, "more than two lines: {stderr}");
+    }
 }

@@ -171,7 +171,7 @@ fn bad_input_is_exit_code_2_and_says_where() {
     fs::write(&config, "[grid]\nbakc = 3.0\n").unwrap();
     let (code, text) = finish(n3p_collect(&config, &folder.path().join("out"), 1));
     assert_eq!(code, Some(2), "{text}");
-    assert!(text.contains("bad.toml, line 2") && text.contains("bakc"), "{text}");
+    assert!(text.contains("bad.toml: line 2") && text.contains("bakc"), "{text}");
 
     fs::write(&config, "seed = 1\n").unwrap();
     let (code, text) = finish(n3p_collect(&config, &config.join("out"), 1));

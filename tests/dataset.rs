@@ -7,6 +7,7 @@ use std::path::Path;
 
 use fixtures::{assert_same_files, collect, config, sample};
 use n3p::dataset::collect::collect_with;
+use n3p::dataset::schema::FORMAT_VERSION;
 use n3p::dataset::{CollectConfig, CollectOptions, Dataset, DatasetError, Part, Status};
 use n3p::geometry::Pose;
 use n3p::rng::{Stream, rng};
@@ -140,9 +141,11 @@ fn edited_metadata_is_noticed() {
     fs::write(&path, text.replace("\"width\": 1.86", "\"width\": 1.5")).unwrap();
     let error = read_error(folder.path());
     assert!(error.contains("metadata differs"), "{error}");
-    fs::write(&path, text.replace("\"format_version\": 1", "\"format_version\": 9")).unwrap();
+    let version = format!("\"format_version\": {FORMAT_VERSION}");
+    fs::write(&path, text.replace(&version, "\"format_version\": 99")).unwrap();
     let error = read_error(folder.path());
-    assert!(error.contains("format version 9; this program reads version 1"), "{error}");
+    let told = format!("format version 99; this program reads version {FORMAT_VERSION}");
+    assert!(error.contains(&told), "{error}");
 }
 
 #[test]

@@ -189,7 +189,13 @@ fn write_refuses_what_read_would_refuse() {
 #[test]
 fn names_become_file_names() {
     let mut scene = Scene::read(&fixture("points.json")).unwrap();
-    for (name, stem) in [("lot A/3", "lot A_3"), ("../x", "_.._x"), ("é-1.2", "é-1.2")] {
+    for (name, stem) in [
+        ("lot A/3", "lot A%2F3"),
+        ("lot A_3", "lot A_3"),
+        ("../x", "%2E.%2Fx"),
+        ("é-1.2", "é-1.2"),
+        ("%→", "%25%E2%86%92"),
+    ] {
         scene.name = name.to_owned();
         assert_eq!(scene.file_stem(), stem);
     }
@@ -201,11 +207,13 @@ proptest! {
     fn every_number_survives_a_round_trip(
         v in prop::collection::vec((-1e7..1e7f64, -1.0..1.0f64), 3..20),
         start in prop::array::uniform3(-1e7..1e7f64),
+        away in -7e3..7e3f64,
     ) {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("scene.json");
         let mut scene = Scene::read(&fixture("points.json")).unwrap();
         scene.start = start.into();
+        scene.goal = scene.start.shifted(away);
         scene.obstacles = vec![v.iter().map(|&(x, y)| [x, y * 1e-9]).collect()];
         scene.write(&path).unwrap();
         prop_assert_eq!(Scene::read(&path).unwrap(), scene);

@@ -7,6 +7,7 @@ use std::time::Instant;
 use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::dataset::{self, CollectConfig, CollectOptions, Part, TypeReport};
+use n3p::progress;
 use n3p::world::ParkingType;
 
 /// Collects training samples: Hybrid A* with Reeds-Shepp expansion in every cell of the grid.
@@ -31,12 +32,12 @@ struct Args {
     #[arg(long, value_name = "I/N", default_value_t)]
     shard: Part,
     /// Worker threads; 0 for one per core
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    threads: usize,
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u16).range(..=1024))]
+    threads: u16,
 }
 
 fn main() -> ExitCode {
-    let args = Args::parse();
+    let args = cli::parse::<Args>();
     cli::run(|| run(&args))
 }
 
@@ -47,9 +48,9 @@ fn run(args: &Args) -> anyhow::Result<ExitCode> {
     };
     let kinds = args.kind.map_or(ParkingType::ALL.to_vec(), |kind| vec![kind]);
     let options = CollectOptions { resume: args.resume, part: args.shard };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build()?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.into()).build()?;
     let begin = Instant::now();
-    let bar = cli::progress(0, "collect");
+    let bar = progress::bar(0, "collect");
     let result = pool.install(|| dataset::collect(&config, &args.out, &kinds, options, &bar));
     bar.finish_and_clear();
     let reports = result.map_err(|e| {
@@ -57,9 +58,9 @@ fn run(args: &Args) -> anyhow::Result<ExitCode> {
     })?;
     let seconds = begin.elapsed().as_secs_f64();
     for report in &reports {
-        println!("{}", summary(report));
+        cli::print(summary(report))?;
     }
-    println!("{}: {seconds:.1} s", args.out.display());
+    cli::print(format!("{}: {seconds:.1} s", args.out.display()))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -10,6 +10,7 @@ use n3p::evaluation::report::{self, Provenance};
 use n3p::evaluation::suite::{self, SuiteConfig};
 use n3p::evaluation::{Case, Method, Models, Outputs, metrics};
 use n3p::planners::HybridAStarConfig;
+use n3p::progress;
 use n3p::world::{Level, ParkingType};
 
 /// Evaluates planning methods on generated scenes, or on a folder of scene files.
@@ -30,7 +31,7 @@ struct Args {
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     methods: Vec<Method>,
     /// Generated scenes per type and level.
-    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=suite::MAX_COUNT as i64))]
     count: u32,
     /// Seed of the generated scenes and of the intervals.
     #[arg(long, default_value_t = 1)]
@@ -51,12 +52,12 @@ struct Args {
     #[arg(long, default_value_t = 200_000, value_name = "N")]
     max_expansions: usize,
     /// Worker threads; more than one disturbs the times, never the results.
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
 }
 
 fn main() -> ExitCode {
-    cli::run(|| evaluate(&Args::parse()))
+    cli::run(|| evaluate(&cli::parse()))
 }
 
 fn evaluate(args: &Args) -> Result<ExitCode> {
@@ -75,7 +76,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
     suite::check(&cases, &models, &config).or_bad_input()?;
     let mut outputs = Outputs::create(args.out.as_deref(), args.paths.as_deref()).or_bad_input()?;
 
-    let bar = cli::progress((cases.len() * config.methods.len()) as u64, "evaluate");
+    let bar = progress::bar((cases.len() * config.methods.len()) as u64, "evaluate");
     let rows = suite::run(&cases, &models, &config, 0, |case, episode| {
         bar.set_message(format!("{} {}", episode.row.method, episode.row.scene));
         bar.inc(1);
@@ -88,9 +89,9 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
     if args.json {
         let groups = metrics::summarise(&rows, args.seed);
         let all = serde_json::json!({"provenance": provenance, "rows": rows, "groups": groups});
-        println!("{all:#}");
+        cli::print(format!("{all:#}"))?;
     } else {
-        print!("{}", report::text(&rows, args.seed));
+        cli::print(report::text(&rows, args.seed).trim_end())?;
     }
     Ok(ExitCode::SUCCESS)
 }

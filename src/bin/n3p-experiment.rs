@@ -8,6 +8,7 @@ use clap::{Parser, Subcommand};
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::evaluation::{report, rows};
 use n3p::experiments::{ExperimentConfig, ExperimentError, runner};
+use n3p::files::reason;
 use n3p::training;
 
 /// Runs experiments: collect, train, evaluate and report, all from one file.
@@ -50,7 +51,7 @@ const SHOWN: usize = 20;
 
 fn main() -> ExitCode {
     training::single_threaded();
-    let args = Args::parse();
+    let args = cli::parse::<Args>();
     cli::run(|| match &args.command {
         Command::Run { file, out } => run(file, out.as_deref()),
         Command::Reproduce { file, out } => reproduce(file, out.as_deref()),
@@ -62,8 +63,8 @@ fn run(file: &Path, out: Option<&Path>) -> Result<ExitCode> {
     let config = ExperimentConfig::read(file).or_bad_input()?;
     let out = out.map_or_else(|| results(file, &config), Path::to_owned);
     let rows = runner::run(&config, &out).map_err(exit_code)?;
-    print!("{}", report::text(&rows, config.evaluate.seed));
-    println!("{}: config, data set, models, rows and report.md", out.display());
+    cli::print(report::text(&rows, config.evaluate.seed).trim_end())?;
+    cli::print(format!("{}: config, data set, models, rows and report.md", out.display()))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -83,18 +84,20 @@ fn reproduce(file: &Path, out: Option<&Path>) -> Result<ExitCode> {
     let found = runner::run(&config, out.unwrap_or(temporary.path())).map_err(exit_code)?;
     let lines = runner::differences(&expected, &found);
     if lines.is_empty() {
-        println!("{} rows agree with {}", found.len(), recorded.display());
+        cli::print(format!("{} rows agree with {}", found.len(), recorded.display()))?;
         return Ok(ExitCode::SUCCESS);
     }
     for line in lines.iter().take(SHOWN) {
-        println!("{line}");
+        cli::print(line)?;
     }
-    println!("{} differences from {}", lines.len(), recorded.display());
+    cli::print(format!("{} differences from {}", lines.len(), recorded.display()))?;
     Ok(ExitCode::FAILURE)
 }
 
 fn list(folder: &Path) -> Result<ExitCode> {
-    let cannot = |e| BadInput(format!("{}: {e}; give a folder of experiments", folder.display()));
+    let cannot = |e: std::io::Error| {
+        BadInput(format!("{}: {}; give a folder of experiments", folder.display(), reason(&e)))
+    };
     let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
         .map_err(cannot)?
         .map(|entry| entry.map(|e| e.path()))
@@ -104,8 +107,8 @@ fn list(folder: &Path) -> Result<ExitCode> {
     files.sort();
     for file in files {
         match ExperimentConfig::read(&file) {
-            Ok(config) => println!("{}: {}", file.display(), config.description),
-            Err(error) => println!("{error}"),
+            Ok(config) => cli::print(format!("{}: {}", file.display(), config.description))?,
+            Err(error) => cli::print(error)?,
         }
     }
     Ok(ExitCode::SUCCESS)

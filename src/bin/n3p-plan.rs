@@ -1,14 +1,15 @@
 //! One scene in, one path out.
 
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput};
-use n3p::dataset::write::write_atomically;
 use n3p::evaluation::draw::{Drawing, scene_svg};
 use n3p::evaluation::{Case, Episode, EpisodeConfig, Method, Models, episode};
+use n3p::files::{check_writable, reason, write_whole};
 use n3p::geometry::{Polygon, Pose};
 use n3p::planners::{HybridAStarConfig, Problem};
 use n3p::world::Scene;
@@ -44,7 +45,7 @@ struct Args {
 }
 
 fn main() -> ExitCode {
-    cli::run(|| plan(&Args::parse()))
+    cli::run(|| plan(&cli::parse()))
 }
 
 fn plan(args: &Args) -> Result<ExitCode> {
@@ -52,6 +53,14 @@ fn plan(args: &Args) -> Result<ExitCode> {
     let file = args.scene.display();
     let problem = Problem::new(&scene)
         .map_err(|e| BadInput(format!("{file}: {e}; move it to where the car fits")))?;
+    let unwritable = |path: &Path, e: io::Error| {
+        let text =
+            format!("{}: cannot be written: {}; choose another file", path.display(), reason(&e));
+        anyhow::Error::from(BadInput(text))
+    };
+    for path in args.out.iter().chain(&args.svg) {
+        check_writable(path).map_err(|e| unwritable(path, e))?;
+    }
     let (method, models) = choose(args, &scene, &problem)?;
     let mut planner = method.build(&models, &HybridAStarConfig::default()).or_bad_input()?;
     let case = Case { kind: problem.kind, level: None, scene };
@@ -64,14 +73,13 @@ fn plan(args: &Args) -> Result<ExitCode> {
     }
     if let Some(svg) = &args.svg {
         let picture = picture(&case.scene, &episode, method, &models);
-        write_atomically(svg, picture.as_bytes())
-            .map_err(|e| BadInput(format!("{}: cannot write: {e}", svg.display())))?;
+        write_whole(svg, picture.as_bytes()).map_err(|e| unwritable(svg, e))?;
     }
     if args.json {
         let result = serde_json::json!({"row": episode.row, "path": episode.path});
-        println!("{result}");
+        cli::print(result)?;
     } else {
-        print!("{}", summary(&episode));
+        cli::print(summary(&episode))?;
     }
     match (&episode.path, episode.row.ok) {
         (None, _) => Ok(ExitCode::from(cli::EXIT_NO_PATH)),
@@ -113,7 +121,7 @@ fn summary(episode: &Episode) -> String {
     let time = row.plan_time_s * 1e3;
     let (Some(length), Some(changes)) = (row.length_m, row.direction_changes) else {
         return format!(
-            "{}: no path by {}: {} (after {} expansions, {time:.3} ms)\n",
+            "{}: no path by {}: {} (after {} expansions, {time:.3} ms)",
             row.scene, row.method, row.reason, row.nodes
         );
     };
@@ -129,7 +137,7 @@ fn summary(episode: &Episode) -> String {
     if !row.route.is_empty() {
         lines.push(format!("  route             {}", row.route));
     }
-    lines.join("\n") + "\n"
+    lines.join("\n")
 }
 
 /// The scene, and over it the path and what N3P made of the spot.

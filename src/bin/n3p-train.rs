@@ -65,7 +65,7 @@ struct KnnArgs {
 
 fn main() -> ExitCode {
     training::single_threaded();
-    let cli = Cli::parse();
+    let cli = cli::parse::<Cli>();
     cli::run(|| match &cli.command {
         Command::Mlp(args) => mlp(args),
         Command::Knn(args) => knn(args),
@@ -97,7 +97,7 @@ fn mlp(args: &MlpArgs) -> anyhow::Result<ExitCode> {
         let (metadata, samples) = (&data.metadata, &data.samples);
         let log = training::mlp::train(metadata, samples, &data.sha256, kind, &config, &out)
             .map_err(|e| exit_code(e, &args.common.data))?;
-        println!(
+        cli::print(format!(
             "{}: {} rows, best of {} epochs is {}; on {} unseen rows the median error is {:.2} m, \
              {:.1}°",
             out.display(),
@@ -107,7 +107,7 @@ fn mlp(args: &MlpArgs) -> anyhow::Result<ExitCode> {
             log.validation_rows,
             log.validation.position_median_m,
             log.validation.heading_median_rad.to_degrees(),
-        );
+        ))?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -119,10 +119,10 @@ fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
         training::knn::train(&data.metadata, &data.samples, &data.sha256, &kinds, &args.out)
             .map_err(|e| exit_code(e, &args.common.data))?;
     for (kind, samples, cells) in &report.kinds {
-        println!("{kind}: {samples} samples in {cells} cells");
+        cli::print(format!("{kind}: {samples} samples in {cells} cells"))?;
     }
     let size = report.bytes as f64 / f64::from(1 << 20);
-    println!("{}: {size:.2} MiB", args.out.display());
+    cli::print(format!("{}: {size:.2} MiB", args.out.display()))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -15,14 +15,15 @@ use rayon::prelude::*;
 
 use super::config::{CollectConfig, ConfigError};
 use super::manifest::{
-    Manifest, ShardRecord, known_shards, manifest_path, metadata_path, record_path,
-    remove_if_present, shard_name, to_json,
+    Manifest, ShardRecord, known_shards, manifest_path, metadata_path, record_path, shard_name,
+    to_json,
 };
 use super::part::Part;
 use super::read::{DatasetError, read_metadata};
 use super::sampler::Sampler;
 use super::schema::{Difference, Metadata, Sample};
-use super::write::{TEMPORARY, encode, write_atomically};
+use super::write::encode;
+use crate::files::{TEMPORARY, reason, remove_if_present, write_whole};
 use crate::world::ParkingType;
 
 /// How a collection runs; none of it changes the bytes.
@@ -61,7 +62,7 @@ pub enum CollectError {
     #[error(transparent)]
     Metadata(#[from] DatasetError),
     /// The folder cannot be made or written to.
-    #[error("{path}: this folder cannot be written: {source}")]
+    #[error("{path}: this folder cannot be written: {}; choose another --out", reason(source))]
     Folder {
         /// The folder.
         path: PathBuf,
@@ -109,7 +110,7 @@ pub enum CollectError {
         difference: Difference,
     },
     /// A file could not be written or removed.
-    #[error("{path}: cannot be written: {source}")]
+    #[error("{path}: cannot be written: {}", reason(source))]
     Write {
         /// The file.
         path: PathBuf,
@@ -199,7 +200,7 @@ fn open_folder(folder: &Path, current: &Metadata) -> Result<Metadata, CollectErr
     if !others.iter().all(|name| name.ends_with(TEMPORARY)) {
         return Err(CollectError::NotADataset { path: folder.to_owned() });
     }
-    write_atomically(&path, &to_json(current)).map_err(unwritable)?;
+    write_whole(&path, &to_json(current)).map_err(unwritable)?;
     Ok(current.clone())
 }
 
@@ -358,7 +359,7 @@ impl Run<'_> {
     }
 
     fn write(&self, path: &Path, bytes: &[u8]) -> Result<(), CollectError> {
-        write_atomically(path, bytes)
+        write_whole(path, bytes)
             .map_err(|source| CollectError::Write { path: path.to_owned(), source })
     }
 }

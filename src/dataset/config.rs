@@ -1,11 +1,12 @@
 //! What is collected: the settings of `n3p-collect --config FILE.toml`.
 
 use std::f64::consts::PI;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use super::schema::{FORMAT_VERSION, GIT_REVISION, Metadata};
+use crate::files::{TomlError, read_toml};
 use crate::planners::HybridAStarConfig;
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
@@ -54,26 +55,9 @@ impl Default for CollectConfig {
 /// Settings that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
-    /// The file cannot be read.
-    #[error("{path}: {source}")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The file is no TOML, or has an unknown or ill-typed key.
-    #[error("{path}, line {line} (`{text}`): {message}")]
-    Parse {
-        /// The file.
-        path: PathBuf,
-        /// Line number, from 1.
-        line: usize,
-        /// What stands there.
-        text: String,
-        /// What is wrong with it.
-        message: String,
-    },
+    /// The file cannot be read, or is no TOML of these settings.
+    #[error(transparent)]
+    File(#[from] TomlError),
     /// A value is out of range; the message says field, value and range.
     #[error("{0}")]
     Value(String),
@@ -85,18 +69,7 @@ impl CollectConfig {
 
     /// Reads and checks a TOML file.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| ConfigError::Read { path: path.to_owned(), source })?;
-        let config: Self = toml::from_str(&text).map_err(|e| {
-            let start = e.span().map_or(0, |span| span.start.min(text.len()));
-            let line = text.as_bytes()[..start].iter().filter(|b| **b == b'\n').count();
-            ConfigError::Parse {
-                path: path.to_owned(),
-                line: line + 1,
-                text: text.lines().nth(line).unwrap_or_default().trim().to_owned(),
-                message: e.message().to_owned(),
-            }
-        })?;
+        let config: Self = read_toml(path)?;
         config.validate().map_err(|e| ConfigError::Value(format!("{}: {e}", path.display())))?;
         Ok(config)
     }
@@ -173,7 +146,7 @@ mod tests {
     #[test]
     fn errors_name_file_line_and_key() {
         let e = error_of("seed = 3\nsamples = 5\n");
-        assert!(e.contains(".toml, line 2 (`samples = 5`): unknown field `samples`"), "{e}");
+        assert!(e.contains(".toml: line 2 (`samples = 5`): unknown field `samples`"), "{e}");
         let e = error_of("seed = \"x\"");
         assert!(e.contains("line 1 (`seed = \"x\"`)"), "{e}");
         let e = error_of("max_expansions = 0");

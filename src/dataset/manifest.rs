@@ -2,13 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use super::schema::{Metadata, Sample, Status};
+use crate::files::sha256_hex;
 use crate::world::ParkingType;
 
 /// The settings that all files of a data set share.
@@ -56,13 +55,13 @@ impl ShardRecord {
             rows: samples.len() as u64,
             solved: solved as u64,
             bytes: bytes.len() as u64,
-            sha256: sha256(bytes),
+            sha256: sha256_hex(&[bytes]),
         }
     }
 
     /// Whether `bytes` are the file's.
     pub fn fits(&self, bytes: &[u8]) -> bool {
-        self.bytes == bytes.len() as u64 && self.sha256 == sha256(bytes)
+        self.bytes == bytes.len() as u64 && self.sha256 == sha256_hex(&[bytes])
     }
 }
 
@@ -143,19 +142,6 @@ pub(super) fn to_json(value: &impl Serialize) -> Vec<u8> {
     bytes
 }
 
-/// Removes a file that may be gone already.
-pub(super) fn remove_if_present(path: &Path) -> io::Result<()> {
-    match fs::remove_file(path) {
-        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(()),
-        result => result,
-    }
-}
-
-/// SHA-256 in lower-case hexadecimal.
-pub(super) fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -170,11 +156,5 @@ mod tests {
                 .collect();
             assert!(cells.iter().copied().eq(0..metadata.grid.cell_count(kind) as u32));
         }
-    }
-
-    #[test]
-    fn checksums_are_the_published_ones() {
-        let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
-        assert_eq!(sha256(b"abc"), expected);
     }
 }

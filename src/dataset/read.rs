@@ -11,11 +11,12 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use rayon::prelude::*;
 use serde_json::Value;
 
-use super::manifest::{Manifest, ShardRecord, manifest_path, metadata_path, sha256, shard_name};
+use super::manifest::{Manifest, ShardRecord, manifest_path, metadata_path, shard_name};
 use super::schema::{
     FORMAT_VERSION, Metadata, Sample, Status, columns, first_difference, parse_manoeuvre,
 };
 use super::write::METADATA_KEY;
+use crate::files::{reason, sha256_hex};
 use crate::geometry::Pose;
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
@@ -63,7 +64,7 @@ pub enum DatasetError {
         kind: ParkingType,
     },
     /// A file cannot be read.
-    #[error("{path}: {source}")]
+    #[error("{path}: cannot be read: {}", reason(source))]
     Io {
         /// The file.
         path: PathBuf,
@@ -148,7 +149,7 @@ impl Dataset {
                 .collect::<Result<Vec<Vec<Sample>>, _>>()?;
             samples.extend(shards.into_iter().flatten());
         }
-        Ok(Dataset { metadata, samples, sha256: sha256(&identity) })
+        Ok(Dataset { metadata, samples, sha256: sha256_hex(&[&identity]) })
     }
 
     /// The solved rows.

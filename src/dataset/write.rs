@@ -1,8 +1,5 @@
-//! Rows → the bytes of a shard, and bytes → a file that is whole or absent.
+//! Rows → the bytes of a shard.
 
-use std::fs::{self, File};
-use std::io::{self, Write};
-use std::path::Path;
 use std::sync::Arc;
 
 use arrow_array::{
@@ -98,40 +95,4 @@ fn arrays(samples: &[Sample]) -> Vec<ArrayRef> {
         small(&|s| s.expansions),
         Arc::new(UInt64Array::from_iter_values(samples.iter().map(|s| s.seed))),
     ]
-}
-
-/// Ends the names of unfinished files; a killed run may leave some.
-pub const TEMPORARY: &str = ".tmp";
-
-/// Puts `bytes` at `path` so that a reader, also after a crash, finds all of them or the file
-/// that was there before.
-pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let name = path.file_name().ok_or(io::ErrorKind::InvalidInput)?.to_string_lossy();
-    let temporary = path.with_file_name(format!("{name}.{}{TEMPORARY}", std::process::id()));
-    let attempt = || {
-        let mut file = File::create(&temporary)?;
-        file.write_all(bytes)?;
-        file.sync_all()?;
-        drop(file);
-        fs::rename(&temporary, path)
-    };
-    match attempt() {
-        // A process that resumes beside this one took the file for a killed one's.
-        Err(e) if e.kind() == io::ErrorKind::NotFound => attempt()?,
-        result => result?,
-    }
-    sync_folder(path.parent().unwrap_or(Path::new("")))
-}
-
-/// Makes renames in `folder` survive a power cut.
-#[cfg(unix)]
-fn sync_folder(folder: &Path) -> io::Result<()> {
-    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    File::open(folder)?.sync_all()
-}
-
-/// A folder cannot be opened as a file here; the rename itself is journalled.
-#[cfg(not(unix))]
-fn sync_folder(_folder: &Path) -> io::Result<()> {
-    Ok(())
 }

@@ -10,7 +10,7 @@ use std::path::{Path as FilePath, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::curves::Path;
-use crate::dataset::write::write_atomically;
+use crate::files::{reason, write_whole};
 use crate::geometry::{Frame, Pose, signed_angle};
 use crate::world::Scene;
 
@@ -32,7 +32,7 @@ pub struct PathFile {
 #[derive(Debug, thiserror::Error)]
 pub enum PathFileError {
     /// Reading or writing failed.
-    #[error("{path}: {error}")]
+    #[error("{path}: {}", reason(error))]
     Io {
         /// The file.
         path: PathBuf,
@@ -98,8 +98,7 @@ impl PathFile {
     /// Writes the file (to a temporary name, then renamed).
     pub fn write(&self, file: &FilePath) -> Result<(), PathFileError> {
         let json = serde_json::to_vec(self).expect("plain numbers and strings");
-        write_atomically(file, &json)
-            .map_err(|error| PathFileError::Io { path: file.to_owned(), error })
+        write_whole(file, &json).map_err(|error| PathFileError::Io { path: file.to_owned(), error })
     }
 }
 

@@ -37,7 +37,7 @@ pub enum ModelsError {
     #[error("--model {0}: a KNN model was given before; one file holds all types: give one")]
     TwoKnn(PathBuf),
     /// The scene's vehicle is not the one trained for.
-    #[error("scene {scene}: vehicle: {error}; or plan with --methods ha-rs")]
+    #[error("scene {scene}: vehicle: {error}; or plan with ha-rs")]
     Vehicle {
         /// Name of the scene.
         scene: String,

@@ -7,7 +7,7 @@ use super::episode::{Case, Episode};
 use super::export::{PathFile, PathFileError};
 use super::report::{self, Provenance};
 use super::rows::{self, Row, RowWriter, RowsError};
-use crate::dataset::write::write_atomically;
+use crate::files::{reason, remove_leftovers, write_whole};
 
 /// The folders of a run; either may be absent.
 pub struct Outputs {
@@ -20,7 +20,7 @@ pub struct Outputs {
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
     /// An output folder cannot be made.
-    #[error("{path}: cannot create the output folder: {error}; choose one you can write to")]
+    #[error("{path}: cannot be an output folder: {}; choose one you can write to", reason(error))]
     Folder {
         /// The folder.
         path: PathBuf,
@@ -34,7 +34,7 @@ pub enum OutputError {
     #[error(transparent)]
     Path(#[from] PathFileError),
     /// The report cannot be written.
-    #[error("{path}: {error}")]
+    #[error("{path}: {}", reason(error))]
     Report {
         /// The file.
         path: PathBuf,
@@ -44,10 +44,11 @@ pub enum OutputError {
 }
 
 impl Outputs {
-    /// Makes the folders and begins `OUT/rows.csv`.
+    /// Makes the folders, removes what killed runs left in them and begins `OUT/rows.csv`.
     pub fn create(out: Option<&Path>, paths: Option<&Path>) -> Result<Self, OutputError> {
         for path in out.into_iter().chain(paths) {
             std::fs::create_dir_all(path)
+                .and_then(|()| remove_leftovers(path))
                 .map_err(|error| OutputError::Folder { path: path.to_owned(), error })?;
         }
         let writer = out.map(|dir| RowWriter::create(&dir.join("rows.csv"))).transpose()?;
@@ -91,7 +92,7 @@ impl Outputs {
         let Some(dir) = self.out else { return Ok(()) };
         rows::write_parquet(&dir.join("rows.parquet"), rows)?;
         let path = dir.join("report.md");
-        write_atomically(&path, report::markdown(title, rows, provenance).as_bytes())
+        write_whole(&path, report::markdown(title, rows, provenance).as_bytes())
             .map_err(|error| OutputError::Report { path, error })
     }
 }

@@ -12,7 +12,7 @@ use arrow_array::{ArrayRef, BooleanArray, Float64Array, RecordBatch, StringArray
 use parquet::arrow::ArrowWriter;
 use serde::{Deserialize, Serialize};
 
-use crate::dataset::write::write_atomically;
+use crate::files::{reason, write_whole};
 use crate::world::{Level, ParkingType};
 
 /// The result of one method on one scene. Columns that describe a path are empty where
@@ -150,7 +150,7 @@ impl Row {
 #[derive(Debug, thiserror::Error)]
 pub enum RowsError {
     /// Reading or writing failed.
-    #[error("{path}: {error}")]
+    #[error("{path}: {}", reason(error))]
     Io {
         /// The file.
         path: PathBuf,
@@ -260,7 +260,7 @@ pub fn write_parquet(path: &Path, rows: &[Row]) -> Result<(), RowsError> {
     let mut writer = ArrowWriter::try_new(&mut bytes, batch.schema(), None).map_err(parquet)?;
     writer.write(&batch).map_err(parquet)?;
     writer.close().map_err(parquet)?;
-    write_atomically(path, &bytes).map_err(|error| RowsError::Io { path: path.to_owned(), error })
+    write_whole(path, &bytes).map_err(|error| RowsError::Io { path: path.to_owned(), error })
 }
 
 fn quoted(field: &str) -> String {

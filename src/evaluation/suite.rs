@@ -40,6 +40,9 @@ pub enum SuiteError {
     /// Two scenes share a name, so their rows could not be told apart.
     #[error("scene name \"{0}\" occurs twice; give every scene a name of its own")]
     SameName(String),
+    /// A method is named twice, so its rows and paths could not be told apart.
+    #[error("--methods names {0} twice; once is enough")]
+    SameMethod(Method),
     /// A scene has no solution by its own data.
     #[error("scene {scene}: {error}; move it, or leave this scene out")]
     Unsolvable {
@@ -58,6 +61,9 @@ pub enum SuiteError {
     #[error(transparent)]
     Models(#[from] ModelsError),
 }
+
+/// The most scenes of one type and level: they are held in memory.
+pub const MAX_COUNT: usize = 100_000;
 
 /// Generated scenes: `count` of each type and level, a function of the seed alone.
 pub fn generated(
@@ -102,6 +108,11 @@ pub fn from_folder(dir: &Path, kind: Option<ParkingType>) -> Result<Vec<Case>, S
 pub fn check(cases: &[Case], models: &Models, config: &SuiteConfig) -> Result<(), SuiteError> {
     let mut names = std::collections::HashSet::new();
     config.build_all(models)?;
+    for (i, method) in config.methods.iter().enumerate() {
+        if config.methods[..i].contains(method) {
+            return Err(SuiteError::SameMethod(*method));
+        }
+    }
     for case in cases {
         let scene = &case.scene;
         if !names.insert(&scene.name) {

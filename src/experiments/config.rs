@@ -6,6 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::dataset::CollectConfig;
 use crate::evaluation::Method;
+use crate::evaluation::suite::MAX_COUNT;
+use crate::files::{TomlError, read_toml};
 use crate::planners::HybridAStarConfig;
 use crate::training::MlpConfig;
 use crate::vehicle::Vehicle;
@@ -87,24 +89,9 @@ fn max_expansions() -> usize {
 /// An experiment that cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
-    /// The file cannot be read.
-    #[error("{path}: cannot read: {error}; `n3p-experiment list` shows those there are")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The operating system's reason.
-        error: std::io::Error,
-    },
-    /// It is no TOML, or holds keys or values of the wrong kind.
-    #[error("{path}: line {line}: {message}")]
-    Parse {
-        /// The file.
-        path: PathBuf,
-        /// Counted from 1.
-        line: usize,
-        /// What is wrong and what would be right.
-        message: String,
-    },
+    /// The file cannot be read, or is no TOML of these settings.
+    #[error(transparent)]
+    File(#[from] TomlError),
     /// A value is out of range.
     #[error("{path}: {message}")]
     Value {
@@ -118,16 +105,9 @@ pub enum ConfigError {
 impl ExperimentConfig {
     /// Reads, resolves and checks an experiment.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| ConfigError::Read { path: path.to_owned(), error })?;
-        let parse = |e: toml::de::Error| {
-            let line = e.span().map_or(1, |s| 1 + text[..s.start].matches('\n').count());
-            let message = e.message().replace('\n', " ");
-            ConfigError::Parse { path: path.to_owned(), line, message }
-        };
         let value = |message| ConfigError::Value { path: path.to_owned(), message };
-        let config: Self = toml::from_str(&text).map_err(parse)?;
-        let written: toml::Table = toml::from_str(&text).map_err(parse)?;
+        let config: Self = read_toml(path)?;
+        let written: toml::Table = read_toml(path)?;
         if let Some(key) = misplaced(&written) {
             let top = key.rsplit('.').next().unwrap_or(key);
             return Err(value(format!("{key}: set {top} once, at the top of the file, not here")));
@@ -165,7 +145,7 @@ impl ExperimentConfig {
         distinct("evaluate.types", &e.types, |t| t.name())?;
         distinct("evaluate.levels", &e.levels, |l| l.name())?;
         for (field, value, max) in [
-            ("evaluate.count", e.count, 1_000_000),
+            ("evaluate.count", e.count, MAX_COUNT),
             ("evaluate.max_expansions", e.max_expansions, 1_000_000_000),
         ] {
             if !(1..=max).contains(&value) {

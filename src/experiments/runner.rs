@@ -17,17 +17,16 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use super::config::ExperimentConfig;
-use crate::cli;
 use crate::dataset::schema::GIT_REVISION;
-use crate::dataset::write::write_atomically;
 use crate::dataset::{CollectError, CollectOptions, Dataset, DatasetError, collect};
 use crate::evaluation::report::Provenance;
 use crate::evaluation::rows::{Row, RowsError, read_csv};
 use crate::evaluation::suite;
 use crate::evaluation::{Models, ModelsError, OutputError, Outputs, SuiteConfig, SuiteError};
+use crate::files::{reason, remove_leftovers, sha256_hex, write_whole};
+use crate::progress;
 use crate::training::{self, TrainingError};
 use crate::world::ParkingType;
 
@@ -35,7 +34,7 @@ use crate::world::ParkingType;
 #[derive(Debug, thiserror::Error)]
 pub enum ExperimentError {
     /// A file of the results cannot be written or read.
-    #[error("{path}: {error}; choose a folder you can write to")]
+    #[error("{path}: {}; choose a folder you can write to", reason(error))]
     Io {
         /// The file.
         path: PathBuf,
@@ -152,9 +151,10 @@ impl Runner<'_> {
 
     /// Makes the folders and records what is about to happen.
     fn prepare(&self) -> Result<(), ExperimentError> {
-        for folder in ["", "models", "stages"] {
-            let path = self.path(folder);
-            std::fs::create_dir_all(&path).map_err(|error| ExperimentError::Io { path, error })?;
+        for path in [self.out.to_owned(), self.path("models"), self.path("stages")] {
+            std::fs::create_dir_all(&path)
+                .and_then(|()| remove_leftovers(&path))
+                .map_err(|error| ExperimentError::Io { path, error })?;
         }
         self.write("config.toml", self.config.to_toml())?;
         let run = serde_json::json!({
@@ -168,8 +168,7 @@ impl Runner<'_> {
 
     fn write(&self, name: &str, text: String) -> Result<(), ExperimentError> {
         let path = self.path(name);
-        write_atomically(&path, text.as_bytes())
-            .map_err(|error| ExperimentError::Io { path, error })
+        write_whole(&path, text.as_bytes()).map_err(|error| ExperimentError::Io { path, error })
     }
 
     /// Settings of the data set; every later stage's contain them.
@@ -216,7 +215,7 @@ impl Runner<'_> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
         let options = CollectOptions { resume: true, ..CollectOptions::default() };
         let (config, kinds) = (&self.config.collect, &self.config.evaluate.types);
-        let bar = cli::progress(0, "collect");
+        let bar = progress::bar(0, "collect");
         let reports = pool.install(|| collect(config, &folder, kinds, options, &bar))?;
         bar.finish_and_clear();
         for r in &reports {
@@ -300,7 +299,7 @@ impl Runner<'_> {
         let cases = suite::generated(vehicle, &e.types, &e.levels, e.count, e.seed)?;
         suite::check(&cases, &models, &suite_config)?;
         let (mut outputs, mut rows) = Outputs::resume(self.out)?;
-        let bar = cli::progress((cases.len() * e.methods.len()) as u64, "evaluate");
+        let bar = progress::bar((cases.len() * e.methods.len()) as u64, "evaluate");
         bar.set_position(rows.len() as u64);
         let new = suite::run(&cases, &models, &suite_config, rows.len(), |case, episode| {
             bar.inc(1);
@@ -326,7 +325,7 @@ impl Runner<'_> {
 /// A checksum over settings.
 fn settings(parts: impl Serialize) -> String {
     let json = serde_json::to_vec(&parts).expect("settings are plain values");
-    Sha256::digest(&json).iter().map(|b| format!("{b:02x}")).collect()
+    sha256_hex(&[&json])
 }
 
 fn remove(path: &Path) -> Result<(), ExperimentError> {

@@ -7,16 +7,15 @@
 //! and renamed, so that a reader never sees half a model.
 
 use std::fs::File;
-use std::io::{ErrorKind, Read, Write};
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-use sha2::{Digest, Sha256};
 
 use super::PoseSelector;
 use super::knn::KnnSelector;
 use super::knn_file;
 use super::mlp::MlpSelector;
+use crate::files::{self, reason, write_whole};
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
 
@@ -37,7 +36,7 @@ pub enum Fault {
     #[error("no such file; train one with n3p-train, or give the path of an existing one")]
     Missing,
     /// The operating system refused.
-    #[error("cannot be read: {0}")]
+    #[error("cannot be read: {}; give the path of a model file", reason(.0))]
     Unreadable(std::io::Error),
     /// Zero bytes.
     #[error("the file is empty; train it again with n3p-train, or copy it again")]
@@ -107,13 +106,8 @@ pub enum Fault {
     #[error("cannot be combined with the models before it: {0}")]
     Mismatch(String),
     /// The file cannot be written.
-    #[error("cannot write to the folder {}: {source}; choose another --out", .folder.display())]
-    Unwritable {
-        /// The folder.
-        folder: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    #[error("cannot be written: {}; choose another --out", reason(.0))]
+    Unwritable(std::io::Error),
 }
 
 impl Fault {
@@ -243,31 +237,19 @@ pub fn find_model(name: impl AsRef<Path>) -> PathBuf {
     if bare && !name.exists() && in_models.exists() { in_models } else { name.to_owned() }
 }
 
-/// Checks that a file could be written at `path`, creating its folder.
+/// Checks that a model could be written at `path`, making its folder, and removes what killed
+/// trainings left there.
 pub fn check_writable(path: &Path) -> Result<(), ArtefactError> {
-    let folder = folder_of(path);
-    let refuse = |source| Fault::Unwritable { folder: folder.to_owned(), source }.of(path);
-    std::fs::create_dir_all(folder).map_err(refuse)?;
-    if path.is_dir() {
-        return Err(refuse(std::io::Error::new(ErrorKind::IsADirectory, "the path is a folder")));
-    }
-    tempfile::NamedTempFile::new_in(folder).map(drop).map_err(refuse)
+    files::check_writable(path)
+        .and_then(|()| files::remove_leftovers(files::folder_of(path)))
+        .map_err(|e| Fault::Unwritable(e).of(path))
 }
 
-/// Writes a file aside, syncs it and renames it into place.
-pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), ArtefactError> {
-    let folder = folder_of(path);
-    let refuse = |source| Fault::Unwritable { folder: folder.to_owned(), source }.of(path);
-    std::fs::create_dir_all(folder).map_err(refuse)?;
-    let mut builder = tempfile::Builder::new();
-    // Temporary files are private by default; a model is as readable as any other file.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));
-    let mut file = builder.tempfile_in(folder).map_err(refuse)?;
-    file.write_all(bytes).map_err(refuse)?;
-    file.as_file().sync_all().map_err(refuse)?;
-    file.persist(path).map_err(|e| refuse(e.error))?;
-    Ok(())
+/// Writes a model, making its folder; it appears whole or not at all.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), ArtefactError> {
+    std::fs::create_dir_all(files::folder_of(path))
+        .and_then(|()| write_whole(path, bytes))
+        .map_err(|e| Fault::Unwritable(e).of(path))
 }
 
 /// Opens a model file, refusing missing ones.
@@ -276,27 +258,6 @@ pub(crate) fn open(path: &Path) -> Result<File, ArtefactError> {
         ErrorKind::NotFound => Fault::Missing.of(path),
         _ => Fault::Unreadable(e).of(path),
     })
-}
-
-/// SHA-256 over the concatenation of `parts`.
-pub(crate) fn sha256(parts: &[&[u8]]) -> [u8; 32] {
-    let mut hasher = Sha256::new();
-    for part in parts {
-        hasher.update(part);
-    }
-    hasher.finalize().into()
-}
-
-/// Lower-case hexadecimal digits.
-pub(crate) fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
-}
-
-fn folder_of(path: &Path) -> &Path {
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    }
 }
 
 #[cfg(test)]
@@ -321,9 +282,9 @@ mod tests {
     fn writes_into_new_folders_and_refuses_files_as_folders() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a/b.bin");
-        write_atomic(&path, b"x").unwrap();
+        write(&path, b"x").unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"x");
         let error = check_writable(&path.join("c.bin")).unwrap_err().to_string();
-        assert!(error.contains("cannot write to the folder") && error.contains("b.bin"), "{error}");
+        assert!(error.contains("b.bin/c.bin: cannot be written: "), "{error}");
     }
 }

@@ -34,6 +34,7 @@ use serde::{Deserialize, Serialize};
 
 use super::artefact::{self, ArtefactError, Fault};
 use crate::curves::Segment;
+use crate::files::sha256;
 use crate::geometry::{Pose, wrap_angle};
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
@@ -152,7 +153,7 @@ pub fn encode(header: &KnnHeader, entries: &[KnnEntries]) -> Vec<u8> {
     bytes.extend(VERSION.to_le_bytes());
     bytes.extend((json.len() as u32).to_le_bytes());
     bytes.extend((payload.len() as u64).to_le_bytes());
-    let sum = artefact::sha256(&[&bytes, &json, &payload]);
+    let sum = sha256(&[&bytes, &json, &payload]);
     bytes.extend(sum);
     bytes.extend(json);
     bytes.extend(payload);
@@ -273,7 +274,7 @@ fn check(bytes: &[u8]) -> Result<(KnnHeader, Vec<Section>), Fault> {
     if got != expected {
         return Err(Fault::Length { expected, got });
     }
-    if artefact::sha256(&[&bytes[..CHECKSUM.start], &bytes[PREAMBLE..]]) != bytes[CHECKSUM] {
+    if sha256(&[&bytes[..CHECKSUM.start], &bytes[PREAMBLE..]]) != bytes[CHECKSUM] {
         return Err(Fault::Checksum);
     }
     let payload = PREAMBLE + header_len;

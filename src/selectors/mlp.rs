@@ -18,6 +18,7 @@ use serde::{Deserialize, Serialize};
 use super::artefact::{self, ArtefactError, Fault};
 use super::network::{self, LAYERS, LayerWeights, Network, OUTPUTS};
 use super::{Features, Normaliser, PoseSelector, Proposal};
+use crate::files::sha256_hex;
 use crate::geometry::Pose;
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
@@ -84,7 +85,7 @@ pub fn encode(header: &MlpHeader, weights: &[LayerWeights]) -> Vec<u8> {
     let header = serde_json::to_string(header).expect("a header is plain data");
     let mut parts = vec![header.as_bytes()];
     parts.extend(tensors.iter().map(|(_, _, data)| data.as_slice()));
-    let sum = artefact::hex(&artefact::sha256(&parts));
+    let sum = sha256_hex(&parts);
     // One entry only: safetensors writes several in random order.
     let entry = format!("{{\"sha256\":\"{sum}\",\"header\":{header}}}");
     let metadata = HashMap::from([(METADATA_KEY.to_owned(), entry)]);
@@ -210,7 +211,7 @@ fn decode(bytes: &[u8]) -> Result<(MlpHeader, Vec<LayerWeights>), Fault> {
     }
     let (sum, json) = split_entry(&entry)
         .ok_or_else(|| Fault::Header("no checksum before the header".to_owned()))?;
-    if sum != artefact::hex(&artefact::sha256(&[json.as_bytes(), &bytes[data_at..]])) {
+    if sum != sha256_hex(&[json.as_bytes(), &bytes[data_at..]]) {
         return Err(Fault::Checksum);
     }
     let header: MlpHeader = serde_json::from_str(json).map_err(|e| Fault::Header(e.to_string()))?;

@@ -7,7 +7,7 @@ use super::{TrainingError, solved};
 use crate::curves::Segment;
 use crate::dataset::{Metadata, Sample};
 use crate::geometry::Pose;
-use crate::selectors::artefact::write_atomic;
+use crate::selectors::artefact;
 use crate::selectors::knn_file::{self, KindHeader, KnnEntries, KnnEntry, KnnHeader};
 use crate::world::ParkingType;
 
@@ -63,7 +63,7 @@ pub fn train(
         crate_version: env!("CARGO_PKG_VERSION").to_owned(),
     };
     let bytes = knn_file::encode(&header, &entries);
-    write_atomic(out, &bytes)?;
+    artefact::write(out, &bytes)?;
     Ok(KnnReport { kinds: report, bytes: bytes.len() })
 }
 

@@ -18,11 +18,11 @@ use serde::{Deserialize, Serialize};
 use super::curve::{self, EpochLoss};
 use super::optimiser::AdamW;
 use super::{Loss, MlpConfig, TrainingError, solved};
-use crate::cli;
 use crate::dataset::{Metadata, Sample, validation_cells};
 use crate::geometry::signed_angle;
+use crate::progress;
 use crate::rng::{Stream, rng};
-use crate::selectors::artefact::write_atomic;
+use crate::selectors::artefact;
 use crate::selectors::mlp::{self, MlpHeader};
 use crate::selectors::network::{
     LAYERS, LayerWeights, OUTPUTS, outputs_from_pose, pose_from_outputs,
@@ -124,7 +124,7 @@ pub fn train(
     };
     let mut best = f32::INFINITY;
     let mut order: Vec<usize> = (0..train.len()).collect();
-    let bar = cli::progress(config.epochs as u64, kind.name());
+    let bar = progress::bar(config.epochs as u64, kind.name());
     for epoch in 0..config.epochs {
         order.shuffle(&mut rng(config.seed, Stream::Shuffle, epoch as u64));
         let train_loss =
@@ -141,7 +141,7 @@ pub fn train(
             best = loss.validation;
             log.best_epoch = epoch + 1;
             log.validation = errors(&model, &validation, &validation_rows, &header)?;
-            write_atomic(out, &mlp::encode(&header, &model.weights()?))?;
+            artefact::write(out, &mlp::encode(&header, &model.weights()?))?;
             write_log(&log, out)?;
         }
         let median = log.validation.position_median_m;
@@ -157,7 +157,7 @@ pub fn train(
     bar.finish_and_clear();
     write_log(&log, out)?;
     let picture = curve::svg(&format!("mlp, {kind}: loss"), &log.losses)?;
-    write_atomic(&out.with_extension("training.svg"), picture.as_bytes())?;
+    artefact::write(&out.with_extension("training.svg"), picture.as_bytes())?;
     Ok(log)
 }
 
@@ -169,7 +169,7 @@ pub fn log_path(out: &Path) -> PathBuf {
 fn write_log(log: &TrainingLog, out: &Path) -> Result<(), TrainingError> {
     let mut text = serde_json::to_string_pretty(log).expect("a log is plain data");
     text.push('\n');
-    Ok(write_atomic(&log_path(out), text.as_bytes())?)
+    Ok(artefact::write(&log_path(out), text.as_bytes())?)
 }
 
 fn features(sample: &Sample) -> [f32; Features::COUNT] {

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::TrainingError;
+use crate::files::read_toml;
 
 /// How far off an output is, per normalised component.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -73,14 +74,11 @@ impl Default for MlpConfig {
 impl MlpConfig {
     /// Reads and checks a TOML file; absent settings keep their defaults.
     pub fn read(path: &Path) -> Result<Self, TrainingError> {
-        let wrong = |problem| TrainingError::ConfigFile { path: path.to_owned(), problem };
-        let text = std::fs::read_to_string(path).map_err(|e| wrong(e.to_string()))?;
-        let config: Self = toml::from_str(&text).map_err(|e| {
-            let line = e.span().map(|span| 1 + text[..span.start].matches('\n').count());
-            let line = line.map(|n| format!("line {n}: ")).unwrap_or_default();
-            wrong(format!("{line}{}", e.message().replace('\n', " ")))
+        let config: Self = read_toml(path)?;
+        config.validate().map_err(|e| TrainingError::ConfigFile {
+            path: path.to_owned(),
+            problem: e.to_string(),
         })?;
-        config.validate().map_err(|e| wrong(e.to_string()))?;
         Ok(config)
     }
 
@@ -137,10 +135,10 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("mlp.toml");
         for (text, told) in [
-            ("epochs = 3\nepoch = 4", "mlp.toml: line 2: unknown field `epoch`"),
+            ("epochs = 3\nepoch = 4", "mlp.toml: line 2 (`epoch = 4`): unknown field `epoch`"),
             ("loss = \"l3\"", "unknown variant `l3`"),
             ("batch = 0", "mlp.toml: batch is 0; expected"),
-            ("batch = ", "mlp.toml: line 1:"),
+            ("batch = ", "mlp.toml: line 1 (`batch =`):"),
         ] {
             std::fs::write(&path, text).unwrap();
             let error = MlpConfig::read(&path).unwrap_err().to_string();

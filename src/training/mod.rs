@@ -13,6 +13,7 @@ pub mod optimiser;
 pub use mlp_config::{Loss, MlpConfig, Schedule};
 
 use crate::dataset::{Sample, Status};
+use crate::files::TomlError;
 use crate::selectors::artefact::ArtefactError;
 use crate::world::ParkingType;
 
@@ -44,12 +45,15 @@ pub enum TrainingError {
         /// What is wrong.
         problem: &'static str,
     },
-    /// A file of settings that cannot be used.
+    /// A file of settings that cannot be read, or is no TOML of these settings.
+    #[error(transparent)]
+    Toml(#[from] TomlError),
+    /// A file with a setting outside its range.
     #[error("{}: {problem}", .path.display())]
     ConfigFile {
         /// The file.
         path: std::path::PathBuf,
-        /// What is wrong, with line and key where known.
+        /// What is wrong.
         problem: String,
     },
     /// A setting outside its range.

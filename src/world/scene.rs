@@ -7,13 +7,14 @@
 
 use std::collections::HashSet;
 use std::fs;
-use std::io::{self, ErrorKind, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, error::Category};
 
 use super::{Obstacles, ParkingType, tpcap};
+use crate::files::{reason, write_whole};
 use crate::geometry::{Polygon, Pose, Vec2};
 use crate::vehicle::Vehicle;
 
@@ -86,21 +87,17 @@ pub enum SceneError {
     },
 }
 
-/// The operating system's reason in plain words, without its error number.
-fn reason(error: &io::Error) -> String {
-    match error.kind() {
-        ErrorKind::NotFound => "no such file or folder".to_owned(),
-        ErrorKind::PermissionDenied => "permission denied".to_owned(),
-        ErrorKind::IsADirectory => "it is a folder, not a file".to_owned(),
-        ErrorKind::NotADirectory => "it is a file, not a folder".to_owned(),
-        _ => error.to_string(),
-    }
-}
-
 impl Scene {
     /// Largest |coordinate| of a scene, metres: beyond it `f64` no longer resolves
     /// what the collision check relies on.
     pub const MAX_COORDINATE: f64 = 1e7;
+
+    /// Largest straight distance between start and goal, metres: paths are sampled and
+    /// checked every few centimetres.
+    pub const MAX_DISTANCE: f64 = 1e4;
+
+    /// Longest name as part of a file name, bytes: leaves room for `.METHOD.json`.
+    pub const MAX_NAME: usize = 200;
 
     /// Reads one scene from `.json` (the scene format) or `.csv` (TPCAP) and validates it.
     /// A scene without a name gets its file's.
@@ -169,21 +166,7 @@ impl Scene {
         self.validate(path)?;
         let error = |error| SceneError::Write { path: path.to_owned(), error };
         let json = serde_json::to_string(self).map_err(|e| error(e.into()))?;
-        let mut name = path.file_name().unwrap_or_default().to_owned();
-        name.push(".tmp");
-        let temporary = path.with_file_name(name);
-        let written = fs::File::create(&temporary)
-            .and_then(|mut file| {
-                file.write_all(json.as_bytes())?;
-                file.write_all(b"\n")?;
-                file.sync_all()
-            })
-            .and_then(|()| fs::rename(&temporary, path));
-        written.map_err(|e| {
-            // The first error is the one to report; a leftover is no worse than that.
-            let _ = fs::remove_file(&temporary);
-            error(e)
-        })
+        write_whole(path, (json + "\n").as_bytes()).map_err(error)
     }
 
     /// Checks every number. `path` is where the scene comes from, for the message.
@@ -203,12 +186,30 @@ impl Scene {
             };
             invalid(field(), format!("= {values:?} {message}"))
         };
+        if let Some(c) = self.name.chars().find(|c| c.is_control()) {
+            let message = format!("holds the control character {c:?}; expected plain text");
+            return invalid("name".to_owned(), message);
+        }
+        let length = self.file_stem().len();
+        if length > Self::MAX_NAME {
+            let message =
+                format!("needs {length} bytes in a file name; expected at most {}", Self::MAX_NAME);
+            return invalid("name".to_owned(), message);
+        }
         if let Err(e) = self.vehicle.validate() {
             let message = format!("is {}; it must be {}", e.value, e.expected);
             return invalid(format!("vehicle.{}", e.field), message);
         }
         numbers(&|| "start".to_owned(), &<[f64; 3]>::from(self.start))?;
         numbers(&|| "goal".to_owned(), &<[f64; 3]>::from(self.goal))?;
+        let distance = self.start.distance(self.goal);
+        if distance > Self::MAX_DISTANCE {
+            let message = format!(
+                "lies {distance:.0} m from the goal; expected at most {} m",
+                Self::MAX_DISTANCE
+            );
+            return invalid("start".to_owned(), message);
+        }
         for (i, polygon) in self.obstacles.iter().enumerate() {
             for (j, vertex) in polygon.iter().enumerate() {
                 numbers(&|| format!("obstacles[{i}][{j}]"), vertex)?;
@@ -238,11 +239,20 @@ impl Scene {
         Ok(())
     }
 
-    /// The name with everything replaced by `_` that does not belong into a file name.
+    /// The name as part of a file name, where no two names meet: what does not belong there
+    /// is written as `%` and the hexadecimal digits of its bytes.
     pub fn file_stem(&self) -> String {
-        let safe = |c: char| if c.is_alphanumeric() || "-_.@+ ".contains(c) { c } else { '_' };
-        let stem: String = self.name.chars().map(safe).collect();
-        if stem.starts_with('.') { format!("_{stem}") } else { stem }
+        let mut stem = String::new();
+        for c in self.name.chars() {
+            let hidden = c == '.' && stem.is_empty();
+            if (c.is_alphanumeric() || "-_.@+ ".contains(c)) && !hidden {
+                stem.push(c);
+            } else {
+                let mut buffer = [0; 4];
+                stem.extend(c.encode_utf8(&mut buffer).bytes().map(|b| format!("%{b:02X}")));
+            }
+        }
+        stem
     }
 
     /// The obstacles as geometry, in the scene's frame. Call after [`Scene::validate`].
