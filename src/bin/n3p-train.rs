@@ -91,9 +91,11 @@ fn mlp(args: &MlpArgs) -> anyhow::Result<ExitCode> {
     for kind in possible {
         artefact::check_writable(&out(kind)).or_bad_input()?;
     }
-    let (data, kinds) = read(&args.common)?;
+    let (_, kinds) = read(&args.common)?;
     for kind in kinds {
         let out = out(kind);
+        // Its own type alone, so that the model does not depend on what else is trained.
+        let data = Dataset::read(&args.common.data, Some(kind)).or_bad_input()?;
         let (metadata, samples) = (&data.metadata, &data.samples);
         let log = training::mlp::train(metadata, samples, &data.sha256, kind, &config, &out)
             .map_err(|e| exit_code(e, &args.common.data))?;
