@@ -291,6 +291,15 @@ pub(super) fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
+/// The key whose value a syntax error lies in, as far as the text tells.
+fn key_before<'a>(text: &'a str, error: &serde_json::Error) -> Option<&'a str> {
+    let before: usize =
+        text.split_inclusive('\n').take(error.line().saturating_sub(1)).map(str::len).sum();
+    let head = text.get(..before + error.column().saturating_sub(1))?;
+    let head = &head[..head.rfind("\":")?];
+    Some(&head[head.rfind('"')? + 1..])
+}
+
 fn parse_json(text: &str, path: &Path) -> Result<Scene, SceneError> {
     let error = match serde_json::from_str(text) {
         Ok(scene) => return Ok(scene),
@@ -301,7 +310,8 @@ fn parse_json(text: &str, path: &Path) -> Result<Scene, SceneError> {
     let message = match serde_json::from_str::<Value>(text) {
         Err(syntax) => match (word_at(text, &syntax), syntax.classify()) {
             (Some(word), _) => format!(
-                "{word} at line {} column {} is not a number; every value must be finite",
+                "{}{word} at line {} column {} is not a number; every value must be finite",
+                key_before(text, &syntax).map_or(String::new(), |key| format!("{key}: ")),
                 syntax.line(),
                 syntax.column()
             ),
