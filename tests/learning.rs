@@ -12,7 +12,7 @@ use n3p::selectors::knn::KnnSelector;
 use n3p::selectors::knn_file;
 use n3p::selectors::mlp::MlpSelector;
 use n3p::selectors::network::{LAYERS, pose_from_outputs};
-use n3p::selectors::{Features, PoseSelector, Proposal};
+use n3p::selectors::{Features, PoseSelector};
 use n3p::training::{self, Loss, MlpConfig, TrainingError};
 use n3p::vehicle::Vehicle;
 use n3p::world::ParkingType;
@@ -151,9 +151,8 @@ fn a_stored_start_returns_its_own_pose() {
         let mut out = Vec::new();
         knn.select(&Features::new(s.start, s.cell), 1, &mut out);
         assert_eq!(out.len(), 1);
-        let pose = out[0].pose;
+        let pose = out[0];
         assert!(pose.distance(s.rs_start) < 2e-6, "{pose:?} {:?}", s.rs_start);
-        assert_eq!(out[0].manoeuvre, s.manoeuvre);
         assert!(signed_angle(pose.heading, s.rs_start.heading).abs() < 1e-6);
     }
 }
@@ -189,19 +188,17 @@ fn several_poses_differ_and_keep_their_order() {
     let dir = tempfile::tempdir().unwrap();
     let knn = knn_of(&samples(KIND, &[4], 200, 3), &[KIND], dir.path());
     let query = features(Pose::new(1.0, 3.0, 0.1), 4);
-    let before = Proposal { pose: Pose::default(), manoeuvre: Vec::new() };
-    let (mut one, mut many) = (Vec::new(), vec![before.clone()]);
+    let before = Pose::default();
+    let (mut one, mut many) = (Vec::new(), vec![before]);
     knn.select(&query, 1, &mut one);
     knn.select(&query, 5, &mut many);
-    assert_eq!(many[0], before, "proposals are appended");
+    assert_eq!(many[0], before, "poses are appended");
     assert_eq!(one[0], many[1]);
     assert!(many.len() > 2 && many.len() <= 6, "{many:?}");
     for (i, a) in many[1..].iter().enumerate() {
         for b in &many[i + 2..] {
-            let (p, q) = (a.pose, b.pose);
-            let same = a.manoeuvre == b.manoeuvre
-                && p.distance(q) <= KnnSelector::SAME_POSITION
-                && signed_angle(p.heading, q.heading).abs() <= KnnSelector::SAME_HEADING;
+            let same = a.distance(*b) <= KnnSelector::SAME_POSITION
+                && signed_angle(a.heading, b.heading).abs() <= KnnSelector::SAME_HEADING;
             assert!(!same, "{a:?} {b:?}");
         }
     }

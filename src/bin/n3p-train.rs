@@ -120,8 +120,9 @@ fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
     let report =
         training::knn::train(&data.metadata, &data.samples, &data.sha256, &kinds, &args.out)
             .map_err(|e| exit_code(e, &args.common.data))?;
-    for (kind, samples, cells) in &report.kinds {
-        cli::print(format!("{kind}: {samples} samples in {cells} cells"))?;
+    for (kind, samples, cells, manoeuvres) in &report.kinds {
+        let text = format!("{kind}: {samples} samples in {cells} cells, {manoeuvres} manoeuvres");
+        cli::print(text)?;
     }
     let size = report.bytes as f64 / f64::from(1 << 20);
     cli::print(format!("{}: {size:.2} MiB", args.out.display()))?;

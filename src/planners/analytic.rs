@@ -54,7 +54,8 @@ pub(crate) struct Entry {
 }
 
 impl Entry {
-    fn new(
+    /// An entry at `pose`, from which `rest` leads to the goal.
+    pub fn new(
         pose: Pose,
         rest: Vec<Segment>,
         preparatory: bool,

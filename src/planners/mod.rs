@@ -10,6 +10,7 @@ pub mod cost;
 mod cost_to_go;
 pub mod hybrid_astar;
 mod lattice;
+pub mod library;
 mod nonholonomic;
 mod problem;
 mod search;

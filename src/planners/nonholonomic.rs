@@ -13,26 +13,47 @@ use crate::vehicle::Vehicle;
 use super::analytic::least_curve_cost;
 use super::cost::CostModel;
 
-/// Bins per metre, half width in bins, heading bins.
-const PER_METRE: f64 = 2.5;
-const HALF: i32 = 50;
-const SIDE: usize = 2 * HALF as usize + 1;
-const HEADINGS: usize = 72;
+/// How finely poses are told apart.
+#[derive(Clone, Copy, Debug)]
+struct Bins {
+    per_metre: f64,
+    /// Half the table's width, bins.
+    half: i32,
+    headings: usize,
+}
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct NonHolonomic {
+    bins: Bins,
     vehicle: Option<Vehicle>,
     table: Vec<f32>,
     words: Vec<Word>,
 }
 
+impl Default for NonHolonomic {
+    /// Steps of 0.4 m and 5°, up to 20 m: for a search, which asks again and again.
+    fn default() -> Self {
+        Self::new(Bins { per_metre: 2.5, half: 50, headings: 72 })
+    }
+}
+
 impl NonHolonomic {
+    /// Steps of 1 m and 15°, up to 32 m: filled after a few dozen problems.
+    pub fn coarse() -> Self {
+        Self::new(Bins { per_metre: 1.0, half: 32, headings: 24 })
+    }
+
+    fn new(bins: Bins) -> Self {
+        Self { bins, vehicle: None, table: Vec::new(), words: Vec::new() }
+    }
+
     /// Forgets the table when the vehicle is another one.
     pub fn reset(&mut self, vehicle: &Vehicle) {
         if self.vehicle.as_ref() != Some(vehicle) {
+            let Bins { half, headings, .. } = self.bins;
             self.vehicle = Some(*vehicle);
             self.table.clear();
-            self.table.resize(SIDE * (HALF as usize + 1) * HEADINGS, f32::NAN);
+            self.table.resize((2 * half as usize + 1) * (half as usize + 1) * headings, f32::NAN);
         }
     }
 
@@ -41,19 +62,21 @@ impl NonHolonomic {
         // Mirror symmetry: only y ≥ 0 is stored.
         let (y, heading) =
             if pose.y < 0.0 { (-pose.y, -pose.heading) } else { (pose.y, pose.heading) };
-        let (ix, iy) = ((pose.x * PER_METRE).round(), (y * PER_METRE).round());
+        let Bins { per_metre, half, headings } = self.bins;
+        let (ix, iy) = ((pose.x * per_metre).round(), (y * per_metre).round());
         let turn = (heading / TAU).rem_euclid(1.0);
-        let ih = (turn * HEADINGS as f64 + 0.5) as usize % HEADINGS;
+        let ih = (turn * headings as f64 + 0.5) as usize % headings;
         let start = Pose::default();
-        if ix.abs() > f64::from(HALF) || iy > f64::from(HALF) {
+        if ix.abs() > f64::from(half) || iy > f64::from(half) {
             return least_curve_cost(start, pose, vehicle, model, &mut self.words);
         }
-        let index = ((iy as usize * SIDE) + (ix as i32 + HALF) as usize) * HEADINGS + ih;
+        let side = 2 * half as usize + 1;
+        let index = ((iy as usize * side) + (ix as i32 + half) as usize) * headings + ih;
         let stored = self.table[index];
         if !stored.is_nan() {
             return f64::from(stored);
         }
-        let center = Pose::new(ix / PER_METRE, iy / PER_METRE, ih as f64 / HEADINGS as f64 * TAU);
+        let center = Pose::new(ix / per_metre, iy / per_metre, ih as f64 / headings as f64 * TAU);
         let cost = least_curve_cost(start, center, vehicle, model, &mut self.words) as f32;
         self.table[index] = cost;
         f64::from(cost)

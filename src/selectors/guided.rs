@@ -1,22 +1,25 @@
 //! N3P: planning guided by a preparatory pose.
 //!
 //! [`GuidedPlanner::paper`] is the paper's Algorithm 1: abstraction → cell → one pose →
-//! HARS to the pose → HARS from the pose to the goal. [`GuidedPlanner::ranked`] is ours:
-//! several ranked poses whose curve to the goal is free; usually two Reeds-Shepp curves
-//! are the whole plan, without any search and without its heuristic. Where they are not, one
-//! search goes to all of these poses, and full HARS is the last resort. Either way the path leaves certified by the exact swept check.
+//! HARS to the pose → HARS from the pose to the goal. [`GuidedPlanner::ranked`] is ours: the
+//! manoeuvres the selector knows are ranked, and the first that is free and that a free curve
+//! joins is the plan, without any search. Where there is none, several poses of the selector
+//! are tried, then one search goes to all of these poses, and full HARS is the last resort.
+//! Either way the path leaves certified by the exact swept check.
 
 use std::sync::Arc;
 
 use crate::curves::{Path, Segment};
 use crate::geometry::{Pose, Vec2};
 use crate::planners::hybrid_astar::{Entry, GoalSet, Leg};
+use crate::planners::library::{Library, LibraryPlan, LibrarySearch};
 use crate::planners::{
     Budget, Guidance, HybridAStar, HybridAStarConfig, NoPath, PlanResult, Planner, Problem, Route,
 };
+use crate::world::ParkingType;
 use crate::world::abstraction::{Abstraction, abstractions};
 
-use super::{Features, PoseSelector, Proposal};
+use super::{Features, PoseSelector};
 
 /// How many ranked poses `n3p` asks for in each abstraction.
 const CANDIDATES: usize = 12;
@@ -38,7 +41,10 @@ pub struct GuidedPlanner {
     strategy: Strategy,
     selector: Arc<dyn PoseSelector>,
     hars: HybridAStar,
-    proposals: Vec<Proposal>,
+    poses: Vec<Pose>,
+    /// The selector's manoeuvres, prepared for the parking types and footprints met so far.
+    libraries: Vec<(ParkingType, Library)>,
+    library_search: LibrarySearch,
 }
 
 impl GuidedPlanner {
@@ -47,7 +53,7 @@ impl GuidedPlanner {
         Self::new(name, Strategy::Paper, selector, config)
     }
 
-    /// Ours (`n3p`): ranked candidates, double Reeds-Shepp test before any search.
+    /// Ours (`n3p`): known manoeuvres and ranked poses before any search.
     pub fn ranked(name: &str, selector: Arc<dyn PoseSelector>, config: HybridAStarConfig) -> Self {
         Self::new(name, Strategy::Ranked, selector, config)
     }
@@ -59,23 +65,35 @@ impl GuidedPlanner {
         config: HybridAStarConfig,
     ) -> Self {
         let hars = HybridAStar::new(config);
-        Self { name: name.to_owned(), strategy, selector, hars, proposals: Vec::new() }
+        let (libraries, library_search) = (Vec::new(), LibrarySearch::default());
+        let (name, poses) = (name.to_owned(), Vec::new());
+        Self { name, strategy, selector, hars, poses, libraries, library_search }
     }
 
-    /// Asks for up to `k` proposals for an abstraction of `problem`, in the planning frame.
+    /// Asks for up to `k` poses for an abstraction of `problem`, in the planning frame.
     fn select(&mut self, problem: &Problem, found: &Abstraction, k: usize) {
         // The cell's frame lies `shift` further out than the problem's.
         let start = Pose { y: problem.start.y - found.shift, ..problem.start };
-        self.proposals.clear();
-        self.selector.select(&Features::new(start, found.cell), k, &mut self.proposals);
-        for proposal in &mut self.proposals {
-            proposal.pose.y += found.shift;
-            if found.shift > 0.0 && !proposal.manoeuvre.is_empty() {
-                // The cell's goal is not yet the parked pose: the rest is straight on.
-                let gear = problem.entry_gears().first().map_or(1.0, |g| g.sign());
-                proposal.manoeuvre.push(Segment::straight(gear * found.shift));
-            }
+        self.poses.clear();
+        self.selector.select(&Features::new(start, found.cell), k, &mut self.poses);
+        for pose in &mut self.poses {
+            pose.y += found.shift;
         }
+    }
+
+    /// The best plan by a known manoeuvre.
+    fn look_up(&mut self, problem: &Problem, goal: &GoalSet) -> Option<LibraryPlan> {
+        let kind = problem.kind?;
+        let (vehicle, cost) = (&problem.vehicle, &self.hars.config().cost);
+        let footprint = problem.collision.footprint();
+        let fits = |(k, l): &(ParkingType, Library)| *k == kind && l.footprint() == footprint;
+        let at = self.libraries.iter().position(fits).unwrap_or_else(|| {
+            let manoeuvres = self.selector.manoeuvres(kind);
+            self.libraries.push((kind, Library::new(&manoeuvres, vehicle, *footprint, cost)));
+            self.libraries.len() - 1
+        });
+        let library = &self.libraries[at].1;
+        self.library_search.plan(library, problem, goal, cost, f64::INFINITY)
     }
 
     fn plan_paper(
@@ -86,7 +104,7 @@ impl GuidedPlanner {
     ) -> Attempt {
         let found = *found.first()?;
         self.select(problem, &found, 1);
-        let pose = self.proposals.first()?.pose;
+        let pose = *self.poses.first()?;
         if !problem.collision.pose_is_free(pose) {
             return None;
         }
@@ -107,14 +125,24 @@ impl GuidedPlanner {
         left: &mut usize,
     ) -> Result<(Path, Guidance), NoPath> {
         let plain = self.hars.goal_set(problem);
+        if let Some(plan) = self.look_up(problem, &plain) {
+            let guidance = Guidance {
+                abstraction: found.first().copied(),
+                preparatory: plan.manoeuvre.map(|_| plan.preparatory),
+                route: Route::Direct,
+            };
+            return Ok((plan.path, guidance));
+        }
         let mut goal = plain.clone();
         for found in found.iter().take(ABSTRACTIONS) {
             self.select(problem, found, CANDIDATES);
             let of_cell = self.hars.goal_set_of_cell(problem, found.shift);
-            for i in 0..self.proposals.len() {
-                let Some((pose, rest)) = self.rest_of(problem, i, &of_cell) else { continue };
-                let cost = self.hars.config().cost;
-                goal.add_preparatory(pose, rest, &problem.vehicle, &cost);
+            for i in 0..self.poses.len() {
+                let pose = self.poses[i];
+                if let Some((pose, rest)) = self.feasible(problem, pose, &of_cell) {
+                    let cost = self.hars.config().cost;
+                    goal.add_preparatory(pose, rest, &problem.vehicle, &cost);
+                }
             }
         }
         let guidance = |entry: Option<&Entry>, route| Guidance {
@@ -138,25 +166,6 @@ impl GuidedPlanner {
         }
         let leg = self.hars.search(problem, problem.start, &plain, None, left)?;
         Ok((leg.path, guidance(None, Route::Fallback)))
-    }
-
-    /// The preparatory pose of proposal `i` and the way from there to the goal.
-    fn rest_of(
-        &mut self,
-        problem: &Problem,
-        i: usize,
-        goal: &GoalSet,
-    ) -> Option<(Pose, Vec<Segment>)> {
-        let Proposal { pose, manoeuvre } = &mut self.proposals[i];
-        if manoeuvre.is_empty() {
-            let pose = *pose;
-            return self.feasible(problem, pose, goal);
-        }
-        // Free by construction in the cell, and thus in the scene; the certificate of the
-        // whole path still checks it.
-        let rest = std::mem::take(manoeuvre);
-        let begin = rest.iter().rev().fold(problem.goal, |pose, s| s.reversed().end(pose));
-        problem.collision.pose_is_free(begin).then_some((begin, rest))
     }
 
     /// `pose`, or one beside it, from which a curve leads to the goal, and that curve.

@@ -18,7 +18,8 @@ use kiddo::{ImmutableKdTree, SquaredEuclidean};
 
 use super::artefact::ArtefactError;
 use super::knn_file::KnnFile;
-use super::{Features, PoseSelector, Proposal};
+use super::{Features, PoseSelector};
+use crate::curves::Segment;
 use crate::geometry::{Pose, signed_angle};
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
@@ -57,7 +58,7 @@ pub struct Neighbour {
 }
 
 impl KnnSelector {
-    /// Two preparatory poses this close count as one (if they share a manoeuvre), metres.
+    /// Two preparatory poses this close count as one, metres.
     pub const SAME_POSITION: f64 = 0.05;
     /// Two preparatory poses this close count as one, radians (2°).
     pub const SAME_HEADING: f64 = 2.0 * std::f64::consts::PI / 180.0;
@@ -201,31 +202,32 @@ impl CellPoints {
 }
 
 impl PoseSelector for KnnSelector {
-    fn select(&self, features: &Features, k: usize, out: &mut Vec<Proposal>) {
+    fn select(&self, features: &Features, k: usize, out: &mut Vec<Pose>) {
         let header = self.file.header();
         let Some(kind) = header.kinds.iter().position(|h| h.kind == features.cell.kind) else {
             return;
         };
         let first = out.len();
-        let mut taken = Vec::new();
         let looked_at = if k > 1 { k.saturating_mul(Self::NEIGHBOURS_PER_POSE) } else { k };
         for neighbour in self.nearest(features, looked_at) {
             let pose = self.file.preparatory(kind, neighbour.sample);
-            let manoeuvre = self.file.manoeuvre(kind, neighbour.sample);
-            let same_pose = |other: Pose| {
+            let known = |other: &Pose| {
                 other.distance(pose) <= Self::SAME_POSITION
                     && signed_angle(other.heading, pose.heading).abs() <= Self::SAME_HEADING
             };
-            let known = taken.iter().zip(&out[first..]);
-            if !known.into_iter().any(|(m, other)| *m == manoeuvre && same_pose(other.pose)) {
-                let segments = manoeuvre.map(|m| self.file.segments(kind, m).collect());
-                out.push(Proposal { pose, manoeuvre: segments.unwrap_or_default() });
-                taken.push(manoeuvre);
+            if !out[first..].iter().any(known) {
+                out.push(pose);
             }
             if out.len() - first == k {
                 return;
             }
         }
+    }
+
+    fn manoeuvres(&self, kind: ParkingType) -> Vec<Vec<Segment>> {
+        let kinds = &self.file.header().kinds;
+        let Some(kind) = kinds.iter().position(|h| h.kind == kind) else { return Vec::new() };
+        (0..kinds[kind].manoeuvres).map(|i| self.file.segments(kind, i).collect()).collect()
     }
 
     fn grid(&self) -> &Grid {

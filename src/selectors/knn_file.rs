@@ -1,4 +1,4 @@
-//! The file format `knn.bin`, version 2.
+//! The file format `knn.bin`, version 3.
 //!
 //! All numbers are little-endian. Nothing needs alignment, so the file is used as mapped.
 //!
@@ -10,19 +10,19 @@
 //! | 8 | length of the payload |
 //! | 32 | SHA-256 of the 24 bytes above, the header and the payload |
 //! | … | header: [`KnnHeader`] as JSON |
-//! | … | payload: for each entry of [`KnnHeader::kinds`] six arrays |
+//! | … | payload: for each entry of [`KnnHeader::kinds`] five arrays |
 //!
 //! The arrays of a parking type: `cells + 1` offsets (u32), where cell `i` owns the samples
 //! `offsets[i]..offsets[i + 1]`; the starts (3 × i16 each); the preparatory poses
-//! (3 × 24-bit integer each); each sample's manoeuvre (u32, all ones for none); where the
-//! manoeuvres begin among the segments (`manoeuvres + 1` × u32); the segments (curvature in
-//! 1/m and signed length in m, 2 × f32 each). Positions count in `extent / 32767` metres for starts, which
+//! (3 × 24-bit integer each); where the manoeuvres of the library begin among the segments
+//! (`manoeuvres + 1` × u32); the segments (curvature in 1/m and signed length in m, 2 × f32
+//! each). Positions count in `extent / 32767` metres for starts, which
 //! only enter a distance, and in `extent / 8388607` metres for poses; headings in
 //! π / 32767 and π / 8388607 radians. With an extent of 16 m a pose is exact to 1 µm and
 //! 0.2 µrad, some thousand times below the planner's clearance margin
 //! ([`crate::planners::Problem::MARGIN`]), so rounding does not take its free Reeds-Shepp
 //! connection away. Manoeuvres are driven back from the goal, so they always end there. A
-//! sample takes 19 bytes; equal manoeuvres are stored once.
+//! sample takes 15 bytes.
 
 use std::f64::consts::PI;
 use std::fs::File;
@@ -43,15 +43,13 @@ use crate::world::cell::Grid;
 /// First bytes of every `knn.bin`.
 pub const MAGIC: [u8; 8] = *b"N3P-KNN\0";
 /// The format version written and read by this program.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 
 const PREAMBLE: usize = 56;
 const CHECKSUM: Range<usize> = 24..56;
 const START_BYTES: usize = 6;
 const POSE_BYTES: usize = 9;
 const SEGMENT_BYTES: usize = 8;
-/// In place of a manoeuvre's index.
-const NO_MANOEUVRE: u32 = u32::MAX;
 const START_STEPS: f64 = 32_767.0;
 const POSE_STEPS: f64 = 8_388_607.0;
 
@@ -87,7 +85,7 @@ pub struct KindHeader {
     pub cells: usize,
     /// Number of samples.
     pub samples: usize,
-    /// Number of different manoeuvres.
+    /// Number of manoeuvres in the library.
     pub manoeuvres: usize,
     /// Number of segments of all manoeuvres.
     pub segments: usize,
@@ -102,8 +100,6 @@ pub struct KnnEntry {
     pub start: Pose,
     /// Rear-axle preparatory pose, spot frame.
     pub preparatory: Pose,
-    /// Index of its manoeuvre.
-    pub manoeuvre: Option<u32>,
 }
 
 /// The samples and manoeuvres of one parking type.
@@ -112,7 +108,7 @@ pub struct KnnEntries {
     /// The samples, sorted by cell; the order within a cell breaks ties between equally near
     /// neighbours.
     pub samples: Vec<KnnEntry>,
-    /// The manoeuvres, in driving order, each ending at the goal.
+    /// The library: manoeuvres in driving order, each ending at the goal.
     pub manoeuvres: Vec<Vec<Segment>>,
 }
 
@@ -134,9 +130,6 @@ pub fn encode(header: &KnnHeader, entries: &[KnnEntries]) -> Vec<u8> {
             for v in steps(e.preparatory, header.extent, POSE_STEPS) {
                 payload.extend(&v.to_le_bytes()[..3]);
             }
-        }
-        for e in entries {
-            payload.extend(e.manoeuvre.unwrap_or(NO_MANOEUVRE).to_le_bytes());
         }
         let mut begin = 0_u32;
         for manoeuvre in manoeuvres {
@@ -175,7 +168,6 @@ struct Section {
     offsets: usize,
     starts: usize,
     poses: usize,
-    manoeuvres: usize,
     segment_begins: usize,
     segments: usize,
 }
@@ -223,12 +215,6 @@ impl KnnFile {
         let v =
             [0, 3, 6].map(|i| i32::from_le_bytes([0, bytes[i], bytes[i + 1], bytes[i + 2]]) >> 8);
         pose(v, self.header.extent, POSE_STEPS)
-    }
-
-    /// Index of a sample's manoeuvre; `None` where one curve reaches the goal.
-    pub fn manoeuvre(&self, kind: usize, sample: usize) -> Option<usize> {
-        let index = u32_at(&self.map, self.sections[kind].manoeuvres + 4 * sample);
-        (index != NO_MANOEUVRE).then_some(index as usize)
     }
 
     /// The motions of a manoeuvre, in driving order; they end at the goal.
@@ -303,7 +289,7 @@ fn sections(bytes: &[u8], payload: usize, header: &KnnHeader) -> Result<Vec<Sect
         }
         let size = k
             .samples
-            .checked_mul(START_BYTES + POSE_BYTES + 4)
+            .checked_mul(START_BYTES + POSE_BYTES)
             .and_then(|n| n.checked_add(4 * (cells + 1)))
             .and_then(|n| n.checked_add(k.manoeuvres.checked_add(1)?.checked_mul(4)?))
             .and_then(|n| n.checked_add(k.segments.checked_mul(SEGMENT_BYTES)?))
@@ -311,10 +297,9 @@ fn sections(bytes: &[u8], payload: usize, header: &KnnHeader) -> Result<Vec<Sect
             .ok_or_else(|| format!("{}: {} samples do not fit", k.kind, k.samples))?;
         let starts = at + 4 * (cells + 1);
         let poses = starts + START_BYTES * k.samples;
-        let manoeuvres = poses + POSE_BYTES * k.samples;
-        let segment_begins = manoeuvres + 4 * k.samples;
+        let segment_begins = poses + POSE_BYTES * k.samples;
         let segments = segment_begins + 4 * (k.manoeuvres + 1);
-        let section = Section { offsets: at, starts, poses, manoeuvres, segment_begins, segments };
+        let section = Section { offsets: at, starts, poses, segment_begins, segments };
         let offset = |i: usize| u32_at(bytes, at + 4 * i) as usize;
         let rising = (0..cells).all(|i| offset(i) <= offset(i + 1));
         if offset(0) != 0 || offset(cells) != k.samples || !rising {
@@ -325,12 +310,10 @@ fn sections(bytes: &[u8], payload: usize, header: &KnnHeader) -> Result<Vec<Sect
         if begin(0) != 0 || begin(k.manoeuvres) != k.segments || !rising {
             return Err(format!("{}: the manoeuvres do not rise in order", k.kind));
         }
-        let known = |i: usize| {
-            let index = u32_at(bytes, manoeuvres + 4 * i);
-            index == NO_MANOEUVRE || (index as usize) < k.manoeuvres
-        };
-        if !(0..k.samples).all(known) {
-            return Err(format!("{}: a sample names a manoeuvre that does not exist", k.kind));
+        let value = |i: usize| f32_at(bytes, segments + 4 * i);
+        let drivable = |i: usize| value(2 * i).is_finite() && value(2 * i + 1).is_finite();
+        if !(0..k.segments).all(drivable) {
+            return Err(format!("{}: a segment of a manoeuvre is not finite", k.kind));
         }
         sections.push(section);
         at += size;

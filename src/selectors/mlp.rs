@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::artefact::{self, ArtefactError, Fault};
 use super::network::{self, LAYERS, LayerWeights, Network, OUTPUTS};
-use super::{Features, Normaliser, PoseSelector, Proposal};
+use super::{Features, Normaliser, PoseSelector};
 use crate::files::sha256_hex;
 use crate::geometry::Pose;
 use crate::vehicle::Vehicle;
@@ -185,10 +185,10 @@ impl MlpSelector {
 }
 
 impl PoseSelector for MlpSelector {
-    fn select(&self, features: &Features, k: usize, out: &mut Vec<Proposal>) {
+    fn select(&self, features: &Features, k: usize, out: &mut Vec<Pose>) {
         if k > 0 {
             let pose = self.predict(features).filter(|pose| pose.is_finite());
-            out.extend(pose.map(|pose| Proposal { pose, manoeuvre: Vec::new() }));
+            out.extend(pose);
         }
     }
 

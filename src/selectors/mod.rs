@@ -22,22 +22,17 @@ use crate::geometry::Pose;
 use crate::world::ParkingType;
 use crate::world::cell::Grid;
 
-/// Where to drive first, and what to do from there.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Proposal {
-    /// The preparatory pose (rear axle, spot frame), for a curve to finish from.
-    pub pose: Pose,
-    /// Motions that end at the parked pose, where the selector knows any: driven back from
-    /// there they begin at a preparatory pose of their own, for scenes too tight for one
-    /// curve. Empty otherwise.
-    pub manoeuvre: Vec<Segment>,
-}
-
 /// Ranks preparatory poses. Implementations are immutable and shared between threads.
 pub trait PoseSelector: Send + Sync {
-    /// Appends up to `k` proposals for `features`, best first. Appends none where the model
-    /// knows nothing, such as an infeasible cell.
-    fn select(&self, features: &Features, k: usize, out: &mut Vec<Proposal>);
+    /// Appends up to `k` preparatory poses (rear axle, spot frame) for `features`, best first.
+    /// Appends none where the model knows nothing, such as an infeasible cell.
+    fn select(&self, features: &Features, k: usize, out: &mut Vec<Pose>);
+
+    /// The manoeuvres it knows for spots of a type: motions in driving order that end at the
+    /// parked pose. None by default.
+    fn manoeuvres(&self, _kind: ParkingType) -> Vec<Vec<Segment>> {
+        Vec::new()
+    }
 
     /// The grid of cells the model was trained on.
     fn grid(&self) -> &Grid;

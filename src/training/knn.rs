@@ -1,10 +1,8 @@
 //! Samples → `knn.bin`.
 
-use std::collections::HashMap;
 use std::path::Path;
 
-use super::{TrainingError, solved};
-use crate::curves::Segment;
+use super::{TrainingError, library, solved};
 use crate::dataset::{Metadata, Sample};
 use crate::geometry::Pose;
 use crate::selectors::artefact;
@@ -14,13 +12,13 @@ use crate::world::ParkingType;
 /// What was stored.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KnnReport {
-    /// Solved samples and cells that have any, per parking type.
-    pub kinds: Vec<(ParkingType, usize, usize)>,
+    /// Per parking type: solved samples, cells that have any, and manoeuvres.
+    pub kinds: Vec<(ParkingType, usize, usize, usize)>,
     /// Size of the file, bytes.
     pub bytes: usize,
 }
 
-/// Stores the solved samples of `kinds` in the file `out`.
+/// Stores the solved samples of `kinds`, and the manoeuvres that serve them, in the file `out`.
 ///
 /// A parking type without a solved sample is an error: a selector that knows nothing of it
 /// would be found out only on the road.
@@ -41,8 +39,13 @@ pub fn train(
             return Err(TrainingError::NoSamples(kind));
         }
         let occupied = solved.chunk_by(|a, b| a.cell_index == b.cell_index).count();
-        report.push((kind, solved.len(), occupied));
-        let collected = collect(&solved);
+        let entry =
+            |s: &&Sample| KnnEntry { cell: s.cell_index, start: s.start, preparatory: s.rs_start };
+        let collected = KnnEntries {
+            samples: solved.iter().map(entry).collect(),
+            manoeuvres: library::condense(metadata, kind, &solved),
+        };
+        report.push((kind, solved.len(), occupied, collected.manoeuvres.len()));
         headers.push(KindHeader {
             kind,
             cells,
@@ -65,24 +68,6 @@ pub fn train(
     let bytes = knn_file::encode(&header, &entries);
     artefact::write(out, &bytes)?;
     Ok(KnnReport { kinds: report, bytes: bytes.len() })
-}
-
-/// The samples, and each different manoeuvre once.
-fn collect(solved: &[&Sample]) -> KnnEntries {
-    let mut entries = KnnEntries::default();
-    let mut known: HashMap<Vec<[u64; 2]>, u32> = HashMap::new();
-    for s in solved {
-        let manoeuvre = (!s.manoeuvre.is_empty()).then(|| {
-            let bits = |m: &Segment| [m.curvature.to_bits(), m.length.to_bits()];
-            *known.entry(s.manoeuvre.iter().map(bits).collect()).or_insert_with(|| {
-                entries.manoeuvres.push(s.manoeuvre.clone());
-                entries.manoeuvres.len() as u32 - 1
-            })
-        });
-        let (cell, start, preparatory) = (s.cell_index, s.start, s.rs_start);
-        entries.samples.push(KnnEntry { cell, start, preparatory, manoeuvre });
-    }
-    entries
 }
 
 /// The least power of two, from 16 m, that no coordinate exceeds.

@@ -1,11 +1,12 @@
 //! Rows of a data set → model files.
 //!
-//! [`knn`] stores samples; [`mlp`] trains a network, with [`optimiser`] and [`curve`] as its
+//! [`knn`] stores samples and a [`library`] of their manoeuvres; [`mlp`] trains a network, with [`optimiser`] and [`curve`] as its
 //! helpers. Both take samples and metadata of one data set and write an artefact that
 //! [`crate::selectors`] loads.
 
 pub mod curve;
 pub mod knn;
+pub mod library;
 pub mod mlp;
 mod mlp_config;
 pub mod optimiser;

@@ -132,6 +132,17 @@ impl BodyFrame {
         Self { pose, sin, cos }
     }
 
+    /// A frame given in this frame, seen from where this one is.
+    #[inline]
+    pub fn compose(&self, other: &BodyFrame) -> Self {
+        let p = self.parent(other.pose.position());
+        Self {
+            pose: Pose::new(p.x, p.y, self.pose.heading + other.pose.heading),
+            sin: self.sin * other.cos + self.cos * other.sin,
+            cos: self.cos * other.cos - self.sin * other.sin,
+        }
+    }
+
     /// A point of the planning frame, seen from the vehicle.
     #[inline]
     pub fn local(&self, p: Vec2) -> Vec2 {

@@ -1,0 +1,322 @@
+//! A library of known manoeuvres into a spot, and the best of them for a start.
+//!
+//! What is hard about parking happens near the spot, and the same few hundred ways of doing
+//! it serve nearly every scene. So instead of searching, one of them is looked up: each is
+//! valued by its own cost plus an estimate of the cost of getting to where it begins, the
+//! most promising are checked first, exactly, against the obstacles of the scene, and the
+//! first that is free and reached by a free Reeds-Shepp curve is the plan. Ours; the paper
+//! has one preparatory pose instead.
+//!
+//! Where the manoeuvres come from: [`crate::training::library`].
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use crate::curves::{Path, Segment};
+use crate::geometry::{Aabb, Pose};
+use crate::vehicle::Vehicle;
+use crate::world::collision::{BodyFrame, Sweep};
+
+use super::Problem;
+use super::analytic::{AnalyticExpansion, Entry, GoalSet};
+use super::cost::CostModel;
+use super::nonholonomic::NonHolonomic;
+
+/// Manoeuvres prepared for one footprint and one cost model.
+#[derive(Clone, Debug)]
+pub struct Library {
+    footprint: Aabb,
+    manoeuvres: Vec<Manoeuvre>,
+}
+
+/// A known way to the goal; poses are seen from the goal.
+#[derive(Clone, Debug)]
+struct Manoeuvre {
+    /// Where it begins, and the motions from there.
+    entry: Entry,
+    /// What it sweeps when driven back from the goal, nearest the goal first.
+    motions: Vec<(BodyFrame, Sweep)>,
+}
+
+impl Library {
+    /// Prepares `manoeuvres`, each the motions that lead to the goal in driving order, for
+    /// `vehicle` with the `footprint` (margin included) that its problems have.
+    pub fn new(
+        manoeuvres: &[Vec<Segment>],
+        vehicle: &Vehicle,
+        footprint: Aabb,
+        model: &CostModel,
+    ) -> Self {
+        let mut library = Self { footprint, manoeuvres: Vec::new() };
+        for segments in manoeuvres {
+            library.add(segments.clone(), vehicle, model);
+        }
+        library
+    }
+
+    /// Adds one more.
+    pub fn add(&mut self, segments: Vec<Segment>, vehicle: &Vehicle, model: &CostModel) {
+        let mut pose = Pose::default();
+        let mut motions = Vec::new();
+        for back in segments.iter().rev().map(|s| s.reversed()) {
+            motions.push((BodyFrame::new(pose), Sweep::new(&self.footprint, back)));
+            pose = back.end(pose);
+        }
+        let entry = Entry::new(pose, segments, true, vehicle, model);
+        self.manoeuvres.push(Manoeuvre { entry, motions });
+    }
+
+    /// The footprint it was prepared for.
+    pub fn footprint(&self) -> &Aabb {
+        &self.footprint
+    }
+
+    /// Number of manoeuvres.
+    pub fn len(&self) -> usize {
+        self.manoeuvres.len()
+    }
+
+    /// Whether it knows nothing.
+    pub fn is_empty(&self) -> bool {
+        self.manoeuvres.is_empty()
+    }
+
+    /// Whether candidate `index` is free in `problem`, whose goal `base` is at. Those beyond the
+    /// manoeuvres are entries of the goal, known to be free.
+    fn is_free(&self, index: usize, base: &BodyFrame, problem: &Problem) -> bool {
+        let Some(m) = self.manoeuvres.get(index) else { return true };
+        m.motions
+            .iter()
+            .all(|(at, sweep)| problem.collision.sweep_is_free(&base.compose(at), sweep))
+    }
+}
+
+/// A plan found in a library.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LibraryPlan {
+    /// From the start to the goal.
+    pub path: Path,
+    /// Its cost.
+    pub cost: f64,
+    /// Index of the manoeuvre; `None` where a curve leads into the goal itself.
+    pub manoeuvre: Option<usize>,
+    /// Where the curve from the start ends.
+    pub preparatory: Pose,
+}
+
+/// Looks plans up; buffers and the table of estimates are reused.
+#[derive(Debug)]
+pub struct LibrarySearch {
+    queue: BinaryHeap<Candidate>,
+    /// The candidates that are free, in the order they were checked.
+    free: Vec<u32>,
+    estimate: NonHolonomic,
+    analytic: AnalyticExpansion,
+}
+
+impl Default for LibrarySearch {
+    fn default() -> Self {
+        let (queue, free, analytic) = Default::default();
+        Self { queue, free, estimate: NonHolonomic::coarse(), analytic }
+    }
+}
+
+/// Ordered so that the heap pops the least estimate, then the first added.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Candidate {
+    estimate: f32,
+    index: u32,
+}
+
+impl Eq for Candidate {}
+
+impl Ord for Candidate {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.estimate.total_cmp(&self.estimate).then(other.index.cmp(&self.index))
+    }
+}
+
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl LibrarySearch {
+    /// A curve may cost this much more than estimated before the next candidate is looked at
+    /// instead: one more change of gear and some steering.
+    const WINDOW: f64 = 4.0;
+
+    /// The first plan of `problem`, in order of estimated cost, that is free and costs less
+    /// than `bound`. The entries of `goal`, which is the problem's, compete with the
+    /// manoeuvres.
+    pub(crate) fn plan(
+        &mut self,
+        library: &Library,
+        problem: &Problem,
+        goal: &GoalSet,
+        model: &CostModel,
+        bound: f64,
+    ) -> Option<LibraryPlan> {
+        debug_assert_eq!(library.footprint(), problem.collision.footprint());
+        self.rank(library, problem, goal, model, bound);
+        let base = BodyFrame::new(goal.pose);
+        let mut free = std::mem::take(&mut self.free);
+        free.clear();
+        let mut plan = None;
+        while let Some(Candidate { estimate, index }) = self.queue.pop() {
+            if library.is_free(index as usize, &base, problem) {
+                free.push(index);
+                let bound = bound.min(f64::from(estimate) + Self::WINDOW);
+                plan = self.join(library, index as usize, problem, goal, model, bound);
+                if plan.is_some() {
+                    break;
+                }
+            }
+        }
+        // Rather a long way round than none.
+        let again = || {
+            free.iter().find_map(|&i| self.join(library, i as usize, problem, goal, model, bound))
+        };
+        plan = plan.or_else(again);
+        self.free = free;
+        plan
+    }
+
+    /// Fills the queue with all candidates that may cost less than `bound`: the manoeuvres, then
+    /// the entries of the goal.
+    fn rank(
+        &mut self,
+        library: &Library,
+        problem: &Problem,
+        goal: &GoalSet,
+        model: &CostModel,
+        bound: f64,
+    ) {
+        self.estimate.reset(&problem.vehicle);
+        let mut queue = std::mem::take(&mut self.queue).into_vec();
+        queue.clear();
+        let from_start = problem.start.relative(goal.pose);
+        let seen_from_start = BodyFrame::new(from_start);
+        let mut add = |pose: Pose, cost: f64| {
+            let approach = self.estimate.cost(pose, &problem.vehicle, model);
+            let (estimate, index) = (cost + approach, queue.len() as u32);
+            queue.push(Candidate { estimate: estimate as f32, index });
+        };
+        for m in &library.manoeuvres {
+            let p = seen_from_start.parent(m.entry.pose.position());
+            let heading = from_start.heading + m.entry.pose.heading;
+            add(Pose::new(p.x, p.y, heading), m.entry.cost());
+        }
+        for entry in goal.entries() {
+            add(problem.start.relative(entry.pose), entry.cost());
+        }
+        queue.retain(|c| f64::from(c.estimate) < bound);
+        self.queue = BinaryHeap::from(queue);
+    }
+
+    /// The plan through a free candidate, if a free curve joins it within `bound`.
+    fn join(
+        &mut self,
+        library: &Library,
+        index: usize,
+        problem: &Problem,
+        goal: &GoalSet,
+        model: &CostModel,
+        bound: f64,
+    ) -> Option<LibraryPlan> {
+        let known = library.manoeuvres.get(index).map(|m| &m.entry);
+        let (entry, preparatory) = match known {
+            Some(entry) => (entry, goal.pose.compose(entry.pose)),
+            None => {
+                let entry = &goal.entries()[index - library.len()];
+                (entry, entry.pose)
+            }
+        };
+        let (departure, bound) = (entry.departure(), bound - entry.cost());
+        let (word, cost) =
+            self.analytic.curve(problem.start, preparatory, departure, bound, problem, model)?;
+        let mut path = Path::new(problem.start, word.segments().iter().copied());
+        path.extend(entry.rest.iter().copied());
+        let manoeuvre = known.map(|_| index);
+        Some(LibraryPlan { path, cost: cost + entry.cost(), manoeuvre, preparatory })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planners::{Budget, HybridAStar, HybridAStarConfig, PlanResult, Planner};
+    use crate::world::generate::{GeneratorConfig, generate};
+    use crate::world::{Level, ParkingType};
+
+    const BUDGET: Budget = Budget { max_expansions: 200_000 };
+
+    fn problems(kind: ParkingType, level: Level, seed: u64) -> Vec<Problem> {
+        let (config, vehicle) = (GeneratorConfig::default(), Vehicle::default());
+        let scene = |i| generate(&config, &vehicle, kind, level, seed, i);
+        (0..20).map(|i| Problem::new(&scene(i)).unwrap()).collect()
+    }
+
+    /// How the searched paths of other scenes end.
+    fn library(kind: ParkingType, footprint: Aabb) -> Library {
+        let config = HybridAStarConfig::default();
+        let mut hars = HybridAStar::new(config);
+        let manoeuvres: Vec<_> = problems(kind, Level::Extreme, 1)
+            .iter()
+            .filter_map(|p| {
+                let path = hars.plan(p, BUDGET).outcome.ok()?;
+                hars.manoeuvre(p, &path)
+            })
+            .collect();
+        assert!(manoeuvres.len() > 10, "{}", manoeuvres.len());
+        Library::new(&manoeuvres, &Vehicle::default(), footprint, &config.cost)
+    }
+
+    #[test]
+    fn plans_are_certified_cost_what_they_say_and_keep_the_bound() {
+        let config = HybridAStarConfig::default();
+        let hars = HybridAStar::new(config);
+        let mut search = LibrarySearch::default();
+        let mut by_manoeuvre = 0;
+        for kind in ParkingType::ALL {
+            for problem in problems(kind, Level::Complex, 2) {
+                let library = library(kind, *problem.collision.footprint());
+                let goal = hars.goal_set(&problem);
+                let mut within =
+                    |bound| search.plan(&library, &problem, &goal, &config.cost, bound);
+                let Some(plan) = within(f64::INFINITY) else { continue };
+                by_manoeuvre += usize::from(plan.manoeuvre.is_some());
+                let cost = config.cost.path(&problem.vehicle, &plan.path.segments);
+                assert!((cost - plan.cost).abs() < 1e-6, "{cost} {}", plan.cost);
+                let less = plan.cost - 1.0;
+                assert!(within(less).is_none_or(|p| p.cost < less));
+                assert_eq!(within(f64::INFINITY).as_ref(), Some(&plan));
+                let near = |s: &crate::curves::Sample| s.pose.distance(plan.preparatory) < 0.03;
+                assert!(plan.path.sample(0.05).iter().any(near));
+                assert!(PlanResult::certified(&problem, plan.path, 0).outcome.is_ok());
+            }
+        }
+        assert!(by_manoeuvre > 30, "{by_manoeuvre} of 60");
+    }
+
+    #[test]
+    fn an_empty_library_leaves_the_curves_into_the_goal() {
+        let config = HybridAStarConfig::default();
+        let mut hars = HybridAStar::new(config);
+        let mut search = LibrarySearch::default();
+        let mut found = 0;
+        for problem in problems(ParkingType::Forward, Level::Easy, 3) {
+            let footprint = *problem.collision.footprint();
+            let library = Library::new(&[], &problem.vehicle, footprint, &config.cost);
+            let goal = hars.goal_set(&problem);
+            let plan = search.plan(&library, &problem, &goal, &config.cost, f64::INFINITY);
+            let direct = hars.direct(&problem, problem.start, &goal);
+            assert_eq!(plan.is_some(), direct.is_some());
+            let (Some(plan), Some(direct)) = (plan, direct) else { continue };
+            found += 1;
+            assert!(plan.cost >= direct.cost - 1e-9 && plan.manoeuvre.is_none());
+        }
+        assert!(found > 2, "{found} of 20");
+    }
+}
