@@ -5,6 +5,9 @@
 //! straight that is checked itself. Curves to several of these *entries* are tried, the
 //! cheapest first.
 
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
 use crate::curves::Segment;
 use crate::curves::reeds_shepp::{self, Word};
 use crate::geometry::Pose;
@@ -147,14 +150,41 @@ impl GoalSet {
 #[derive(Debug, Default)]
 pub(super) struct AnalyticExpansion {
     words: Vec<Word>,
-    candidates: Vec<Candidate>,
+    /// Words not tried yet.
+    candidates: BinaryHeap<Candidate>,
+    /// Entries whose words were not asked for yet, the most promising last.
+    waiting: Vec<Waiting>,
 }
 
-#[derive(Debug)]
+/// A word by its number in `words`; ordered so that the heap pops the cheapest, of equals the
+/// one to the first target, and of these the one that was found first.
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Candidate {
     cost: f64,
-    word: Word,
-    target: usize,
+    target: u32,
+    word: u32,
+}
+
+impl Eq for Candidate {}
+
+impl Ord for Candidate {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let by_cost = other.cost.total_cmp(&self.cost);
+        by_cost.then_with(|| (other.target, other.word).cmp(&(self.target, self.word)))
+    }
+}
+
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+/// An entry that no way costs less to than `bound`.
+#[derive(Clone, Copy, Debug)]
+struct Waiting {
+    bound: f64,
+    target: u32,
 }
 
 /// A free way into a goal set: a curve, then the rest of an entry.
@@ -194,13 +224,31 @@ impl AnalyticExpansion {
         problem: &Problem,
         model: &CostModel,
     ) -> Option<Connection<'a>> {
+        self.words.clear();
         self.candidates.clear();
-        for (i, entry) in goal.entries.iter().enumerate() {
-            self.add(from, entry.pose, entry.departure, entry.cost, i, &problem.vehicle, model);
+        self.waiting.clear();
+        let curves = Curves::new(from, &problem.vehicle, model);
+        for (target, entry) in (0..).zip(&goal.entries) {
+            let bound = curves.bound(entry.pose) + entry.cost;
+            self.waiting.push(Waiting { bound, target });
         }
-        let c = self.cheapest_free(from, problem)?;
-        let (entry, entry_index, cost) = (&goal.entries[c.target], c.target, c.cost);
-        Some(Connection { from, word: c.word, entry, entry_index, cost })
+        self.waiting.sort_unstable_by(|a, b| b.bound.total_cmp(&a.bound));
+        loop {
+            let cheapest = self.candidates.peek().map_or(f64::INFINITY, |c| c.cost);
+            if let Some(w) = self.waiting.pop_if(|w| w.bound <= cheapest) {
+                let e = &goal.entries[w.target as usize];
+                let add = |cost| Some(cost + e.cost);
+                self.add(&curves, e.pose, e.departure, w.target, add);
+            } else {
+                let c = self.candidates.pop()?;
+                let word = self.words[c.word as usize];
+                if problem.collision.segments_are_free(from, word.segments()) {
+                    let entry_index = c.target as usize;
+                    let entry = &goal.entries[entry_index];
+                    return Some(Connection { from, word, entry, entry_index, cost: c.cost });
+                }
+            }
+        }
     }
 
     /// The cheapest free curve from the free pose `from` to `to`, where the way goes on with
@@ -214,37 +262,64 @@ impl AnalyticExpansion {
         problem: &Problem,
         model: &CostModel,
     ) -> Option<(Word, f64)> {
+        self.words.clear();
         self.candidates.clear();
-        self.add(from, to, departure, 0.0, 0, &problem.vehicle, model);
-        self.candidates.retain(|c| c.cost < bound);
-        self.cheapest_free(from, problem).map(|c| (c.word, c.cost))
+        let curves = Curves::new(from, &problem.vehicle, model);
+        if curves.bound(to) >= bound {
+            return None;
+        }
+        self.add(&curves, to, departure, 0, |cost| (cost < bound).then_some(cost));
+        while let Some(c) = self.candidates.pop() {
+            let word = self.words[c.word as usize];
+            if problem.collision.segments_are_free(from, word.segments()) {
+                return Some((word, c.cost));
+            }
+        }
+        None
     }
 
-    /// Adds all words to one target as candidates.
-    #[expect(clippy::too_many_arguments, reason = "private; one call per target")]
+    /// Adds the words to one target as candidates, those that `cost` keeps.
     fn add(
         &mut self,
-        from: Pose,
+        curves: &Curves,
         to: Pose,
         departure: DriveState,
-        rest: f64,
-        target: usize,
-        vehicle: &Vehicle,
-        model: &CostModel,
+        target: u32,
+        cost: impl Fn(f64) -> Option<f64>,
     ) {
-        self.words.clear();
-        reeds_shepp::words(from, to, vehicle.turning_radius(), &mut self.words);
-        for &word in &self.words {
-            let (cost, arrival) = curve_cost(&word, DriveState::PARKED, vehicle, model);
-            let cost = cost + model.change(arrival, departure) + rest;
-            self.candidates.push(Candidate { cost, word, target });
+        let first = self.words.len();
+        reeds_shepp::words(curves.from, to, curves.radius, &mut self.words);
+        for (word, w) in (first as u32..).zip(&self.words[first..]) {
+            let (curve, arrival) = curve_cost(w, DriveState::PARKED, curves.vehicle, curves.model);
+            if let Some(cost) = cost(curve + curves.model.change(arrival, departure)) {
+                self.candidates.push(Candidate { cost, target, word });
+            }
         }
     }
+}
 
-    fn cheapest_free(&mut self, from: Pose, problem: &Problem) -> Option<&Candidate> {
-        self.candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        let world = &problem.collision;
-        self.candidates.iter().find(|c| world.segments_are_free(from, c.word.segments()))
+/// What the costs of all curves from one pose share.
+struct Curves<'a> {
+    from: Pose,
+    radius: f64,
+    vehicle: &'a Vehicle,
+    model: &'a CostModel,
+}
+
+impl<'a> Curves<'a> {
+    fn new(from: Pose, vehicle: &'a Vehicle, model: &'a CostModel) -> Self {
+        Self { from, radius: vehicle.turning_radius(), vehicle, model }
+    }
+
+    /// A cost that no curve to `to` goes below.
+    fn bound(&self, to: Pose) -> f64 {
+        /// Metres that rounding may cost a word.
+        const ROUNDING: f64 = 1e-6;
+        #[cfg(feature = "rsb")]
+        let length = reeds_shepp::shortest_length(self.from, to, self.radius);
+        #[cfg(not(feature = "rsb"))]
+        let length = self.from.distance(to);
+        (length - ROUNDING) * self.model.forward.min(self.model.backward)
     }
 }
 

@@ -1,0 +1,173 @@
+//! Reeds-Shepp curves: shortest paths of a car that drives both ways.
+//!
+//! J. A. Reeds and L. A. Shepp, "Optimal paths for a car that goes both forwards and
+//! backwards", Pacific J. Math. 145(2), 1990. Formula numbers below are theirs. A *word*
+//! is a sequence of at most five segments, each a left or right arc of smallest radius or
+//! a straight, each forward or backward; 48 words suffice. Nine base formulas give all of
+//! them through time flip, reflection and reversal.
+//!
+//! Inside this module lengths are in turning radii and the goal is seen from the start.
+
+mod centres;
+mod words;
+
+use self::centres::UnitGoal;
+use self::words::{Sink, Turn, enumerate};
+use super::Segment;
+use crate::geometry::Pose;
+
+/// Lengths below this (in radii) count as zero, so that a word which needs an arc of
+/// −1e-17 is not lost to rounding.
+const ZERO: f64 = 1e-9;
+
+/// One word between two poses: up to five segments, lengths in metres.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Word {
+    segments: [Segment; 5],
+    len: usize,
+}
+
+impl Word {
+    /// The segments in driving order, metres.
+    pub fn segments(&self) -> &[Segment] {
+        &self.segments[..self.len]
+    }
+
+    /// Driven length, metres.
+    pub fn length(&self) -> f64 {
+        self.segments().iter().map(|s| s.length.abs()).sum()
+    }
+
+    /// Its name: turn (`L`, `S`, `R`) and gear (`+`, `-`) per segment, such as `L+R-S-`.
+    pub fn name(&self) -> String {
+        let turn = |s: &Segment| match s.curvature {
+            k if k > 0.0 => 'L',
+            k if k < 0.0 => 'R',
+            _ => 'S',
+        };
+        let gear = |s: &Segment| if s.length < 0.0 { '-' } else { '+' };
+        self.segments().iter().flat_map(|s| [turn(s), gear(s)]).collect()
+    }
+}
+
+/// All words from `from` to `to` that exist, unsorted, appended to `out` (at most 48).
+///
+/// `radius`: turning radius, metres. Every arc turns by at most π.
+pub fn words(from: Pose, to: Pose, radius: f64, out: &mut Vec<Word>) {
+    let first = out.len();
+    enumerate(UnitGoal::new(from, to, radius), &mut Collect { radius, out });
+    if out.len() == first {
+        // Only when the poses coincide: the formulas give words of length zero or none.
+        debug_assert!(from.distance(to) < 1e-6 * radius);
+        out.push(Word::default());
+    }
+}
+
+/// Makes words of metres.
+struct Collect<'a> {
+    radius: f64,
+    out: &'a mut Vec<Word>,
+}
+
+impl Sink for Collect<'_> {
+    #[inline]
+    fn word<const N: usize>(&mut self, turns: [Turn; N], lengths: [f64; N]) {
+        let mut word = Word::default();
+        for (turn, length) in turns.into_iter().zip(lengths) {
+            if length.abs() > ZERO {
+                let curvature = f64::from(turn) / self.radius;
+                word.segments[word.len] = Segment { curvature, length: length * self.radius };
+                word.len += 1;
+            }
+        }
+        self.out.push(word);
+    }
+}
+
+/// Length of the shortest word from `from` to `to`, metres.
+pub fn shortest_length(from: Pose, to: Pose, radius: f64) -> f64 {
+    struct Least(f64);
+    impl Sink for Least {
+        #[inline]
+        fn word<const N: usize>(&mut self, _: [Turn; N], lengths: [f64; N]) {
+            self.0 = self.0.min(lengths.iter().map(|l| l.abs()).sum());
+        }
+    }
+    let mut least = Least(f64::INFINITY);
+    enumerate(UnitGoal::new(from, to, radius), &mut least);
+    if least.0.is_finite() { least.0 * radius } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+    use crate::curves::Path;
+    use crate::geometry::wrap_angle;
+    use crate::rng::{Stream, rng};
+    use rand::RngExt;
+
+    const RADIUS: f64 = 4.057;
+
+    fn random_pose(rng: &mut impl rand::Rng, reach: f64) -> Pose {
+        let mut r = |a: f64| rng.random_range(-a..a);
+        Pose::new(r(reach), r(reach), r(7.0))
+    }
+
+    #[test]
+    fn every_word_reaches_its_goal() {
+        let mut rng = rng(1, Stream::Start, 0);
+        let mut out = Vec::new();
+        let mut names = std::collections::BTreeSet::new();
+        for i in 0..100_000 {
+            let reach = [3.0, 10.0, 30.0][i % 3];
+            let (from, to) = (random_pose(&mut rng, reach), random_pose(&mut rng, reach));
+            out.clear();
+            words(from, to, RADIUS, &mut out);
+            assert!(!out.is_empty() && out.len() <= 48, "{from:?} {to:?}");
+            for w in &out {
+                let end = w.segments().iter().fold(from, |p, s| s.end(p));
+                let miss = end.distance(to) + wrap_angle(end.heading - to.heading).abs();
+                assert!(miss < 1e-6, "{from:?} {to:?} {} {miss}", w.name());
+                assert!(w.segments().iter().all(|s| s.turn().abs() <= PI + 1e-9));
+                names.insert(w.name());
+            }
+            let best = out.iter().map(Word::length).fold(f64::INFINITY, f64::min);
+            let shortest = shortest_length(from, to, RADIUS);
+            assert!((best - shortest).abs() < 1e-6);
+            assert!(shortest >= from.distance(to) - 1e-9);
+        }
+        assert_eq!(names.len(), 48, "{names:?}");
+    }
+
+    #[test]
+    fn shortest_length_is_symmetric() {
+        let mut rng = rng(2, Stream::Start, 0);
+        for _ in 0..10_000 {
+            let (a, b) = (random_pose(&mut rng, 10.0), random_pose(&mut rng, 10.0));
+            let there = shortest_length(a, b, RADIUS);
+            assert!((there - shortest_length(b, a, RADIUS)).abs() < 1e-6);
+            let mirror = |p: Pose| Pose::new(p.x, -p.y, -p.heading);
+            assert!((there - shortest_length(mirror(a), mirror(b), RADIUS)).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn equal_poses_need_no_motion() {
+        let p = Pose::new(3.0, 4.0, 1.0);
+        let mut out = Vec::new();
+        words(p, p, RADIUS, &mut out);
+        assert!(out.iter().any(|w| w.length() < 1e-6));
+        assert!(shortest_length(p, p, RADIUS) < 1e-6);
+        assert!(Path::new(p, out[0].segments().iter().copied()).end().distance(p) < 1e-6);
+    }
+
+    #[test]
+    fn straight_ahead_is_one_straight() {
+        let mut out = Vec::new();
+        words(Pose::default(), Pose::new(5.0, 0.0, 0.0), 1.0, &mut out);
+        let best = out.iter().min_by(|a, b| a.length().total_cmp(&b.length())).unwrap();
+        assert_eq!(best.name(), "S+");
+    }
+}
