@@ -57,26 +57,34 @@ impl NonHolonomic {
         }
     }
 
-    /// Least cost from the start to `pose`, given in the start's frame.
+    /// Least cost from the start to `pose`, given in the start's frame; its heading must lie
+    /// in [−8π, 8π].
     pub fn cost(&mut self, pose: Pose, vehicle: &Vehicle, model: &CostModel) -> f64 {
         // Mirror symmetry: only y ≥ 0 is stored.
         let (y, heading) =
             if pose.y < 0.0 { (-pose.y, -pose.heading) } else { (pose.y, pose.heading) };
         let Bins { per_metre, half, headings } = self.bins;
-        let (ix, iy) = ((pose.x * per_metre).round(), (y * per_metre).round());
-        let turn = (heading / TAU).rem_euclid(1.0);
-        let ih = (turn * headings as f64 + 0.5) as usize % headings;
-        let start = Pose::default();
-        if ix.abs() > f64::from(half) || iy > f64::from(half) {
-            return least_curve_cost(start, pose, vehicle, model, &mut self.words);
-        }
         let side = 2 * half as usize + 1;
-        let index = ((iy as usize * side) + (ix as i32 + half) as usize) * headings + ih;
+        // Truncation of what is not negative: cheaper than rounding without SSE 4.1.
+        let (x, y_bin) = (pose.x * per_metre + f64::from(half) + 0.5, y * per_metre + 0.5);
+        let (ix, iy) = (x as usize, y_bin as usize);
+        let start = Pose::default();
+        if x < 0.0 || ix >= side || iy > half as usize {
+            let far = Pose::new(pose.x, y, heading);
+            return least_curve_cost(start, far, vehicle, model, &mut self.words);
+        }
+        let turn = heading * (headings as f64 / TAU) + 0.5 + (4 * headings) as f64;
+        let ih = turn as usize % headings;
+        let index = (iy * side + ix) * headings + ih;
         let stored = self.table[index];
         if !stored.is_nan() {
             return f64::from(stored);
         }
-        let center = Pose::new(ix / per_metre, iy / per_metre, ih as f64 / headings as f64 * TAU);
+        let center = Pose::new(
+            (ix as f64 - f64::from(half)) / per_metre,
+            iy as f64 / per_metre,
+            ih as f64 / headings as f64 * TAU,
+        );
         let cost = least_curve_cost(start, center, vehicle, model, &mut self.words) as f32;
         self.table[index] = cost;
         f64::from(cost)
