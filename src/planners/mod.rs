@@ -1,8 +1,8 @@
 //! Planners: from a [`Problem`] to a path or a reason why there is none.
 //!
 //! Every method of a table, learnt or not, meets the evaluation as a [`Planner`].
-//! The search core is in [`hybrid_astar`]; its parts are `search` (queue and
-//! nodes), `lattice` (visited states), `cost_to_go` and `nonholonomic` (the two heuristics),
+//! The search core is in [`hybrid_astar`]; its parts are `search` (nodes and
+//! expansion), `open` (queues), `lattice` (visited states), `cost_to_go` and `nonholonomic` (the two heuristics),
 //! [`analytic`] (Reeds-Shepp expansion) and [`cost`].
 
 pub mod analytic;
@@ -11,6 +11,7 @@ mod cost_to_go;
 pub mod hybrid_astar;
 mod lattice;
 mod nonholonomic;
+mod open;
 mod problem;
 mod search;
 

@@ -1,12 +1,9 @@
-//! The best-first search of Hybrid A*: open queue, node arena, expansion.
+//! The best-first search of Hybrid A*: node arena and expansion.
 //!
 //! The search runs *from the goal*: driving is reversible, and near the goal space is
 //! tight. A node's motion leads forward in time from the node to its parent, so that the
 //! way from a node to the goal is read off by walking up to the root. What is estimated is
 //! the cost from the start to the node.
-
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
 
 use crate::curves::Segment;
 use crate::geometry::{Aabb, Pose, wrap_angle};
@@ -20,6 +17,8 @@ use super::cost_to_go::CostToGo;
 use super::hybrid_astar::{HybridAStarConfig, Resolution, inscribed_radius};
 use super::lattice::Lattice;
 use super::nonholonomic::NonHolonomic;
+pub(super) use super::open::NodeIndex;
+use super::open::OpenList;
 
 /// Why the queue ran empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,9 +28,6 @@ pub(super) enum Stop {
     /// Everything reachable was expanded.
     Exhausted,
 }
-
-/// Index of a node in the arena.
-pub(super) type NodeIndex = u32;
 
 /// In place of a primitive: the node is a root.
 const ROOT: u32 = u32::MAX;
@@ -47,27 +43,6 @@ struct Node {
     parent: NodeIndex,
     /// Index of the motion; `ROOT` for a root.
     primitive: u32,
-}
-
-/// An open node; ordered so that the heap pops the least f, then the earliest.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Open {
-    f: f32,
-    node: NodeIndex,
-}
-
-impl Eq for Open {}
-
-impl Ord for Open {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.f.total_cmp(&self.f).then(other.node.cmp(&self.node))
-    }
-}
-
-impl PartialOrd for Open {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
 }
 
 /// A motion primitive.
@@ -87,7 +62,7 @@ struct Primitive {
 #[derive(Debug, Default)]
 pub(super) struct Search {
     nodes: Vec<Node>,
-    open: BinaryHeap<Open>,
+    open: OpenList,
     lattice: Lattice,
     cost_to_go: CostToGo,
     nonholonomic: NonHolonomic,
@@ -159,15 +134,12 @@ impl Search {
 
     /// Takes the open node of least f that is still the best of its state.
     pub fn pop(&mut self) -> Option<NodeIndex> {
-        while let Some(Open { node, .. }) = self.open.pop() {
-            let n = self.nodes[node as usize];
+        let Self { nodes, lattice, open, .. } = self;
+        open.pop(|node| {
             // A cheaper way to the same state was found after this one was queued.
-            let stale = self.lattice.state(n.pose).is_some_and(|s| self.lattice.cost(s) < n.cost);
-            if !stale {
-                return Some(node);
-            }
-        }
-        None
+            let n = nodes[node as usize];
+            lattice.state(n.pose).is_some_and(|s| lattice.cost(s) < n.cost)
+        })
     }
 
     /// Why the queue is empty.
@@ -248,7 +220,7 @@ impl Search {
     fn push(&mut self, node: Node) {
         let index = self.nodes.len() as NodeIndex;
         self.nodes.push(node);
-        self.open.push(Open { f: node.cost + self.weight * node.to_come, node: index });
+        self.open.push(index, node.cost + self.weight * node.to_come);
     }
 
     /// The larger of the two estimates of the cost from the start to `pose`.
