@@ -6,7 +6,10 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use super::models::Models;
-use crate::planners::{HybridAStar, HybridAStarConfig, Planner};
+use crate::planners::{
+    HybridAStar, HybridAStarConfig, MultiHeuristicHybridAStar, PlainHybridAStar, Planner,
+    ScenarioHybridAStar,
+};
 use crate::selectors::guided::GuidedPlanner;
 use crate::world::UnknownName;
 
@@ -57,7 +60,7 @@ pub enum MethodError {
     NotAvailable(Method),
 }
 
-const AVAILABLE: &str = "ha-rs, ha-hold, mlp-n3p, knn-n3p, n3p";
+const AVAILABLE: &str = "ha, ha-rs, ha-hold, mhha, sha, mlp-n3p, knn-n3p, n3p";
 
 /// How many solutions the paper's HA* Hold compares.
 const HOLD_SOLUTIONS: usize = 5;
@@ -134,8 +137,11 @@ impl Method {
         let no_model = |model, example| MethodError::NoModel { method: self, model, example };
         let selector = models.selector(self);
         match self {
+            Self::Ha => Ok(Box::new(PlainHybridAStar::new(*config))),
             Self::HaRs => Ok(Box::new(HybridAStar::new(*config))),
             Self::HaHold => Ok(Box::new(HybridAStar::hold(*config, HOLD_SOLUTIONS))),
+            Self::Mhha => Ok(Box::new(MultiHeuristicHybridAStar::new(*config))),
+            Self::Sha => Ok(Box::new(ScenarioHybridAStar::new(*config))),
             Self::KnnN3p => {
                 let selector = selector.ok_or_else(|| no_model("knn", "knn.bin"))?;
                 Ok(Box::new(GuidedPlanner::paper(self.name(), selector, *config)))
@@ -148,9 +154,7 @@ impl Method {
                 let selector = selector.ok_or_else(|| no_model("knn", "knn.bin"))?;
                 Ok(Box::new(GuidedPlanner::ranked(self.name(), selector, *config)))
             }
-            Self::Ha | Self::Mhha | Self::Sha | Self::RlSimple | Self::RlEval => {
-                Err(MethodError::NotAvailable(self))
-            }
+            Self::RlSimple | Self::RlEval => Err(MethodError::NotAvailable(self)),
         }
     }
 }

@@ -8,16 +8,24 @@
 pub mod analytic;
 pub mod cost;
 mod cost_to_go;
+mod exit_manoeuvre;
 pub mod hybrid_astar;
+mod joint;
 mod lattice;
+mod multi_heuristic;
 mod nonholonomic;
 mod open;
+mod plain;
 mod problem;
+mod scenario;
 mod search;
 
 pub use analytic::AnalyticTail;
-pub use hybrid_astar::{HybridAStar, HybridAStarConfig, Resolution};
+pub use hybrid_astar::{GoalRegion, HybridAStar, HybridAStarConfig, Resolution};
+pub use multi_heuristic::MultiHeuristicHybridAStar;
+pub use plain::PlainHybridAStar;
 pub use problem::{Problem, ProblemError};
+pub use scenario::ScenarioHybridAStar;
 
 use crate::curves::Path;
 use crate::geometry::{Pose, signed_angle};

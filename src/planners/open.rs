@@ -27,25 +27,73 @@ impl PartialOrd for Open {
     }
 }
 
-/// The open nodes of a search.
+type Queue = BinaryHeap<Open>;
+
+/// The open nodes of a search: one queue, the *anchor*, or besides it any number of others
+/// that order the same nodes differently (see `multi_heuristic.rs`).
 #[derive(Debug, Default)]
 pub(super) struct OpenList {
-    queue: BinaryHeap<Open>,
+    anchor: Queue,
+    others: Vec<Queue>,
+    /// How far beyond the anchor's least priority the others may go: a factor.
+    slack: f32,
+    /// Whose turn it was last, among the others.
+    turn: usize,
+    /// By node: whether some queue gave it out already. Only kept where there are others.
+    taken: Vec<bool>,
 }
 
 impl OpenList {
+    /// A list with `others` queues besides the anchor; see [`OpenList::pop`] for `slack`.
+    pub fn with_others(others: usize, slack: f32) -> Self {
+        let others = (0..others).map(|_| Queue::new()).collect();
+        Self { others, slack, ..Self::default() }
+    }
+
     /// Forgets all nodes.
     pub fn clear(&mut self) {
-        self.queue.clear();
+        self.anchor.clear();
+        self.others.iter_mut().for_each(Queue::clear);
+        self.taken.clear();
+        self.turn = 0;
     }
 
-    /// Adds a node of priority `f`.
-    pub fn push(&mut self, node: NodeIndex, f: f32) {
-        self.queue.push(Open { f, node });
+    /// Adds the next node (nodes come in the order of their indices) with its priority in
+    /// the anchor and in each other queue.
+    pub fn push(&mut self, node: NodeIndex, anchor: f32, others: impl Iterator<Item = f32>) {
+        self.anchor.push(Open { f: anchor, node });
+        if !self.others.is_empty() {
+            debug_assert_eq!(node as usize, self.taken.len());
+            self.taken.push(false);
+            self.others.iter_mut().zip(others).for_each(|(q, f)| q.push(Open { f, node }));
+        }
     }
 
-    /// Takes the first node that is not `stale`; those before it are dropped.
+    /// Takes a node that is not `stale`; stale ones are dropped.
+    ///
+    /// The other queues have their turns one after another, and each gives its first node as
+    /// long as that node's priority there is at most `slack` times the least of the anchor.
+    /// Otherwise, and where there are no others, the anchor gives its first.
     pub fn pop(&mut self, mut stale: impl FnMut(NodeIndex) -> bool) -> Option<NodeIndex> {
-        std::iter::from_fn(|| self.queue.pop()).map(|open| open.node).find(|&n| !stale(n))
+        let Self { anchor, others, taken, .. } = self;
+        if others.is_empty() {
+            return std::iter::from_fn(|| anchor.pop()).map(|o| o.node).find(|&n| !stale(n));
+        }
+        let mut first = |queue: &mut Queue| {
+            while let Some(&open) = queue.peek() {
+                if !taken[open.node as usize] && !stale(open.node) {
+                    return Some(open);
+                }
+                queue.pop();
+            }
+            None
+        };
+        let least = first(anchor)?;
+        self.turn = (self.turn + 1) % others.len();
+        let open = first(&mut others[self.turn])
+            .filter(|open| open.f <= self.slack * least.f)
+            .unwrap_or(least);
+        taken[open.node as usize] = true;
+        Some(open.node)
     }
 }

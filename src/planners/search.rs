@@ -6,28 +6,20 @@
 //! the cost from the start to the node.
 
 use crate::curves::Segment;
-use crate::geometry::{Aabb, Pose, wrap_angle};
+use crate::geometry::{Aabb, Pose, Vec2, wrap_angle};
 use crate::vehicle::{Gear, Vehicle};
 use crate::world::collision::{BodyFrame, Sweep};
 
-use super::Problem;
 use super::analytic::GoalSet;
 use super::cost::{CostModel, DriveState};
 use super::cost_to_go::CostToGo;
 use super::hybrid_astar::{HybridAStarConfig, Resolution, inscribed_radius};
 use super::lattice::Lattice;
+use super::multi_heuristic::Guide;
 use super::nonholonomic::NonHolonomic;
 pub(super) use super::open::NodeIndex;
 use super::open::OpenList;
-
-/// Why the queue ran empty.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Stop {
-    /// The wave from the start never reaches the goal.
-    Enclosed,
-    /// Everything reachable was expanded.
-    Exhausted,
-}
+use super::{NoPath, Problem};
 
 /// In place of a primitive: the node is a root.
 const ROOT: u32 = u32::MAX;
@@ -69,12 +61,38 @@ pub(super) struct Search {
     primitives: Vec<Primitive>,
     start: Pose,
     weight: f32,
+    guides: Vec<Guide>,
     enclosed: bool,
     /// Expansions since a curve was last tried.
     since_curve: u32,
 }
 
+/// What the estimate of the cost from the start to a pose is made of.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Estimate {
+    /// Among the obstacles, turning on the spot: the A* cost-to-go.
+    pub grid: f32,
+    /// With the vehicle's turning circle, without obstacles: the least Reeds-Shepp cost.
+    pub curve: f32,
+    /// Angle between the pose's axis and the direction in which `grid` falls, radians.
+    pub misaligned: f32,
+}
+
+impl Estimate {
+    /// The larger of the two estimates; infinite where the start cannot be reached.
+    pub fn cost(self) -> f32 {
+        self.grid.max(self.curve)
+    }
+}
+
 impl Search {
+    /// A search with one more queue for each of `guides`, which may go beyond the anchor's
+    /// least priority by the factor `slack`.
+    pub fn guided(guides: Vec<Guide>, slack: f32) -> Self {
+        let open = OpenList::with_others(guides.len(), slack);
+        Self { open, guides, ..Self::default() }
+    }
+
     /// Starts a search from `goal` to `start` within `domain`.
     pub fn begin(
         &mut self,
@@ -103,13 +121,14 @@ impl Search {
         }
         for (i, entry) in goal.entries().iter().enumerate() {
             let pose = Pose { heading: wrap_angle(entry.pose.heading), ..entry.pose };
-            let to_come = self.heuristic(pose, vehicle, &config.cost);
+            let estimate = self.estimate_to_come(pose, vehicle, &config.cost);
+            let to_come = estimate.cost();
             let Some(state) = self.lattice.state(pose) else { continue };
             let cost = entry.cost() as f32;
             if to_come.is_finite() && cost < self.lattice.cost(state) {
                 self.lattice.set_cost(state, cost);
                 let parent = i as NodeIndex;
-                self.push(Node { pose, cost, to_come, parent, primitive: ROOT });
+                self.push(Node { pose, cost, to_come, parent, primitive: ROOT }, estimate);
             }
         }
     }
@@ -143,8 +162,8 @@ impl Search {
     }
 
     /// Why the queue is empty.
-    pub fn stop(&self) -> Stop {
-        if self.enclosed { Stop::Enclosed } else { Stop::Exhausted }
+    pub fn stop(&self) -> NoPath {
+        if self.enclosed { NoPath::Enclosed } else { NoPath::Exhausted }
     }
 
     /// Whether a curve from the start to `node` should be tried: rarely far from the start,
@@ -208,30 +227,55 @@ impl Search {
             {
                 continue;
             }
-            let to_come = self.heuristic(pose, &problem.vehicle, &config.cost);
+            let estimate = self.estimate_to_come(pose, &problem.vehicle, &config.cost);
+            let to_come = estimate.cost();
             if !to_come.is_finite() {
                 continue;
             }
             self.lattice.set_cost(lattice_state, cost);
-            self.push(Node { pose, cost, to_come, parent: node, primitive: i as u32 });
+            self.push(Node { pose, cost, to_come, parent: node, primitive: i as u32 }, estimate);
         }
     }
 
-    fn push(&mut self, node: Node) {
+    fn push(&mut self, node: Node, estimate: Estimate) {
         let index = self.nodes.len() as NodeIndex;
         self.nodes.push(node);
-        self.open.push(index, node.cost + self.weight * node.to_come);
+        let others = self.guides.iter().map(|guide| node.cost + guide.priority(estimate));
+        self.open.push(index, node.cost + self.weight * node.to_come, others);
     }
 
-    /// The larger of the two estimates of the cost from the start to `pose`.
-    fn heuristic(&mut self, pose: Pose, vehicle: &Vehicle, model: &CostModel) -> f32 {
+    /// Estimates the cost from the start to `pose`.
+    fn estimate_to_come(&mut self, pose: Pose, vehicle: &Vehicle, model: &CostModel) -> Estimate {
         let per_metre = model.forward.min(model.backward);
-        let among_obstacles = self.cost_to_go.distance(pose.position()) * per_metre;
-        if !among_obstacles.is_finite() {
-            return f32::INFINITY;
+        let distance = self.cost_to_go.distance(pose.position());
+        if !distance.is_finite() {
+            return Estimate { grid: f32::INFINITY, curve: 0.0, misaligned: 0.0 };
         }
         let curve = self.nonholonomic.cost(self.start.relative(pose), vehicle, model);
-        among_obstacles.max(curve) as f32
+        let misaligned = if self.guides.is_empty() { 0.0 } else { self.misaligned(pose, distance) };
+        Estimate {
+            grid: (distance * per_metre) as f32,
+            curve: curve as f32,
+            misaligned: misaligned as f32,
+        }
+    }
+
+    fn misaligned(&mut self, pose: Pose, here: f64) -> f64 {
+        const REACH: f64 = 1.0;
+        let p = pose.position();
+        let mut fall = |dx: f64, dy: f64| {
+            let at = self.cost_to_go.distance(Vec2::new(p.x + dx, p.y + dy));
+            if at.is_finite() { here - at } else { -REACH }
+        };
+        let x = fall(REACH, 0.0) - fall(-REACH, 0.0);
+        let y = fall(0.0, REACH) - fall(0.0, -REACH);
+        if x == 0.0 && y == 0.0 {
+            return 0.0;
+        }
+        let (sin, cos) = pose.sin_cos();
+        // Either end of the car may lead.
+        let (along, across) = (x * cos + y * sin, y * cos - x * sin);
+        across.abs().atan2(along.abs())
     }
 
     /// The motions from `node` to the goal, in driving order, and the root's goal-set entry.
