@@ -23,7 +23,7 @@ pub enum Method {
     HaRs,
     /// The best of the first five solutions of Hybrid A*.
     HaHold,
-    /// Multi-heuristic A* over the hybrid lattice.
+    /// Multi-heuristic A* over the hybrid lattice, with Reeds-Shepp expansion.
     Mhha,
     /// Hybrid A* to the end of a geometric exit manoeuvre (parallel only).
     Sha,
@@ -209,8 +209,10 @@ mod tests {
         let build = |m: Method| m.build(&Models::default(), &HybridAStarConfig::default());
         let message = build(Method::N3p).err().unwrap().to_string();
         assert!(message.contains("--model") && message.contains("n3p-train knn"), "{message}");
-        let message = build(Method::Sha).err().unwrap().to_string();
+        let message = build(Method::RlEval).err().unwrap().to_string();
         assert!(message.contains("not available in this version"), "{message}");
-        assert_eq!(Method::available(&Models::default()), [Method::HaRs, Method::HaHold]);
+        let available = Method::available(&Models::default());
+        assert_eq!(available, Method::ALL[..5]);
+        assert!(available.iter().all(|m| m.is_graph_search() && AVAILABLE.contains(m.name())));
     }
 }

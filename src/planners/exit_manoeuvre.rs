@@ -8,7 +8,7 @@
 //! arc that lines it up with the lane. Driven in reverse, an exit is the end of a parking
 //! manoeuvre.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_3};
 
 use crate::curves::Segment;
 use crate::geometry::Pose;
@@ -22,7 +22,11 @@ const ARCS: usize = 24;
 const STUCK: f64 = 0.01;
 /// Bisection ends at this length, metres.
 const PRECISION: f64 = 0.005;
-/// Shares of the last left arc after which the car is lined up with the lane.
+/// The nose turns no further from the lane's direction, radians.
+const STEEPEST: f64 = FRAC_PI_2;
+/// A car turned so far has left the spot, radians.
+const STEEP: f64 = FRAC_PI_3;
+/// Shares of the left arc that leaves the spot after which it may end.
 const SHARES: [f64; 5] = [1.0, 0.85, 0.7, 0.55, 0.4];
 
 /// A pose outside (or on the way out of) the spot, and the motions from there to the goal.
@@ -69,21 +73,20 @@ impl<'a> Manoeuvre<'a> {
         manoeuvre
     }
 
-    /// Adds the exits of this manoeuvre: one after each forward arc, and those lined up
-    /// with the lane after the first arc that allows any.
+    /// Adds the exits of this manoeuvre: the end of each forward arc inside the spot, then
+    /// several along the first arc that leaves it.
     fn run(mut self, exits: &mut Vec<Exit>) {
         let full_lock = self.problem.vehicle.max_curvature();
         for _ in 0..ARCS / 2 {
             let begin = self.pose.heading;
-            let room = (FRAC_PI_2 - begin) / full_lock;
-            let left = self.longest(full_lock, Gear::Forward, room);
-            let lined_up = self.lined_up(left, exits);
+            let left = self.longest(full_lock, Gear::Forward, (STEEPEST - begin) / full_lock);
+            let leaves = self.leave(left, exits);
             self.drive(left);
-            exits.push(self.exit([]));
-            if lined_up {
+            if leaves || self.pose.heading >= STEEPEST - 1e-6 {
                 return;
             }
-            let room = (FRAC_PI_2 - self.pose.heading) / full_lock;
+            exits.push(self.exit(&[]));
+            let room = (STEEPEST - self.pose.heading) / full_lock;
             let back = self.longest(-full_lock, Gear::Backward, room);
             self.drive(back);
             if self.pose.heading - begin < STUCK {
@@ -92,26 +95,35 @@ impl<'a> Manoeuvre<'a> {
         }
     }
 
-    /// Adds the exits that end parallel to the lane after some share of the arc `left`.
-    fn lined_up(&self, left: Segment, exits: &mut Vec<Exit>) -> bool {
+    /// Adds the exits along the arc `left`, if it leaves the spot: the arc ends at some share
+    /// of it, and where there is room another lines the car up with the lane.
+    fn leave(&self, left: Segment, exits: &mut Vec<Exit>) -> bool {
+        let (goal, vehicle) = (self.problem.goal, &self.problem.vehicle);
         let before = exits.len();
+        let mut leaves = left.end(self.pose).heading >= STEEP;
         for share in SHARES {
             let left = Segment { length: left.length * share, ..left };
             let pose = left.end(self.pose);
+            exits.push(self.exit(&[left]));
             let right =
                 Segment { curvature: -left.curvature, length: pose.heading / left.curvature };
-            if right.length > 0.0 && self.problem.collision.segment_is_free(pose, right) {
-                exits.push(self.exit([left]));
-                exits.push(self.exit([left, right]));
+            // Lined up, the car stands beside the parked one.
+            let out = right.end(pose).y - goal.y >= vehicle.width;
+            if out && self.problem.collision.segment_is_free(pose, right) {
+                exits.push(self.exit(&[left, right]));
+                leaves = true;
             }
         }
-        exits.len() > before
+        if !leaves {
+            exits.truncate(before);
+        }
+        leaves
     }
 
     /// The exit reached by driving `more` from here.
-    fn exit<const N: usize>(&self, more: [Segment; N]) -> Exit {
+    fn exit(&self, more: &[Segment]) -> Exit {
         let pose = more.iter().fold(self.pose, |pose, s| s.end(pose));
-        let driven = self.driven.iter().chain(&more).rev();
+        let driven = self.driven.iter().chain(more).rev();
         Exit { pose, way_in: driven.map(|s| s.reversed()).collect() }
     }
 
@@ -135,5 +147,47 @@ impl<'a> Manoeuvre<'a> {
             if free(middle) { low = middle } else { high = middle }
         }
         motion(low)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::curves::Path;
+    use crate::vehicle::Vehicle;
+    use crate::world::generate::{GeneratorConfig, generate};
+    use crate::world::{Level, ParkingType};
+
+    #[test]
+    fn every_exit_is_free_and_leads_to_the_goal() {
+        let (config, vehicle) = (GeneratorConfig::default(), Vehicle::default());
+        for level in Level::ALL {
+            for i in 0..50 {
+                let scene = generate(&config, &vehicle, ParkingType::Parallel, level, 78, i);
+                let problem = Problem::new(&scene).unwrap();
+                let exits = exits(&problem);
+                let out = exits.iter().any(|e| e.pose.y - problem.goal.y >= vehicle.width / 2.0);
+                assert!(out, "{}: no exit leaves the spot", scene.name);
+                for Exit { pose, way_in } in exits {
+                    let path = Path::new(pose, way_in);
+                    assert!(problem.collision.path_is_free(&path), "{} {pose:?}", scene.name);
+                    assert!(path.end().distance(problem.goal) < 1e-9, "{} {pose:?}", scene.name);
+                    assert!((path.end().heading - problem.goal.heading).abs() < 1e-9);
+                    assert!(path.max_abs_curvature() <= vehicle.max_curvature() + 1e-12);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_bisected_motion_ends_just_before_contact() {
+        let (config, vehicle) = (GeneratorConfig::default(), Vehicle::default());
+        let scene = generate(&config, &vehicle, ParkingType::Parallel, Level::Extreme, 78, 0);
+        let problem = Problem::new(&scene).unwrap();
+        let at_goal = Manoeuvre::new(&problem, Settle::Here);
+        let back = at_goal.longest(0.0, Gear::Backward, 5.0);
+        let further = Segment::straight(back.length - 2.0 * PRECISION);
+        assert!(back.length < 0.0 && problem.collision.segment_is_free(problem.goal, back));
+        assert!(!problem.collision.segment_is_free(problem.goal, further));
     }
 }

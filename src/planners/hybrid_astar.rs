@@ -19,7 +19,7 @@ use crate::vehicle::Vehicle;
 use super::analytic::{AnalyticExpansion, AnalyticTail};
 pub(crate) use super::analytic::{Connection, Entry, GoalSet};
 use super::cost::CostModel;
-use super::multi_heuristic::Guide;
+use super::multi_heuristic::{Guides, MultiHeuristicConfig};
 use super::search::Search;
 use super::{Budget, NoPath, PlanResult, Planner, Problem};
 
@@ -47,6 +47,8 @@ pub struct HybridAStarConfig {
     pub heuristic_weight: f64,
     /// What counts as arrived for the method `ha`, which has no curves to arrive exactly.
     pub goal_region: GoalRegion,
+    /// The queues of the method `mhha`.
+    pub multi_heuristic: MultiHeuristicConfig,
 }
 
 /// How near a search without curves must come before its path may be bent to fit (see
@@ -126,6 +128,7 @@ impl Default for HybridAStarConfig {
             entry_max: 5.0,
             heuristic_weight: 1.0,
             goal_region: GoalRegion::default(),
+            multi_heuristic: MultiHeuristicConfig::default(),
         }
     }
 }
@@ -142,6 +145,9 @@ impl HybridAStarConfig {
             ("heuristic_weight", self.heuristic_weight, 0.0, 100.0),
             ("goal_region.position", self.goal_region.position, 0.01, 5.0),
             ("goal_region.heading", self.goal_region.heading, 0.001, 1.6),
+            ("multi_heuristic.slack", self.multi_heuristic.slack, 1.0, 100.0),
+            ("multi_heuristic.inflation", self.multi_heuristic.inflation, 0.0, 100.0),
+            ("multi_heuristic.depth", self.multi_heuristic.depth, 0.0, 100.0),
         ] {
             if !(v.is_finite() && (low..=high).contains(&v)) {
                 return Err(format!(
@@ -234,9 +240,9 @@ impl HybridAStar {
         Self { config, solutions: solutions.max(1), queue, analytic }
     }
 
-    /// The first solution found by a search with a queue for each of `guides` besides its own.
-    pub(super) fn guided(config: HybridAStarConfig, guides: Vec<Guide>, slack: f32) -> Self {
-        Self { queue: Search::guided(guides, slack), ..Self::new(config) }
+    /// The first solution found by a search that follows `guides` as well.
+    pub(super) fn guided(config: HybridAStarConfig, guides: Guides) -> Self {
+        Self { queue: Search::guided(guides), ..Self::new(config) }
     }
 
     /// The settings.
@@ -444,4 +450,34 @@ fn manoeuvre_begin(path: &Path) -> usize {
 /// The largest disc around the rear axle inside every footprint, metres.
 pub(super) fn inscribed_radius(vehicle: &Vehicle) -> f64 {
     (vehicle.width / 2.0).min(vehicle.rear_overhang).min(vehicle.front_extent())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn the_goal_region_has_the_tolerances_it_says() {
+        let region = GoalRegion { position: 0.2, heading: 0.1 };
+        let target = Pose::new(1.0, 2.0, PI - 0.02);
+        let within = |dx, dy, turn| {
+            region.contains(target, Pose::new(1.0 + dx, 2.0 + dy, target.heading + turn))
+        };
+        assert!(within(0.0, 0.0, 0.0) && within(0.19, 0.0, -0.09) && within(0.1, -0.1, 0.09));
+        assert!(!within(0.15, 0.15, 0.0) && !within(0.0, 0.0, 0.11) && !within(0.0, 0.0, PI));
+        // Beyond π the heading begins again at −π.
+        assert!(region.contains(target, Pose { heading: 0.05 - PI, ..target }));
+    }
+
+    #[test]
+    fn settings_out_of_range_are_named() {
+        let mut config = HybridAStarConfig::default();
+        assert_eq!(config.validate(), Ok(()));
+        config.goal_region.position = f64::NAN;
+        assert!(config.validate().unwrap_err().contains("planner.goal_region.position is NaN"));
+        config = HybridAStarConfig::default();
+        config.multi_heuristic.slack = 0.5;
+        assert!(config.validate().unwrap_err().contains("planner.multi_heuristic.slack is 0.5"));
+    }
 }

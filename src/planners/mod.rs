@@ -22,7 +22,7 @@ mod search;
 
 pub use analytic::AnalyticTail;
 pub use hybrid_astar::{GoalRegion, HybridAStar, HybridAStarConfig, Resolution};
-pub use multi_heuristic::MultiHeuristicHybridAStar;
+pub use multi_heuristic::{MultiHeuristicConfig, MultiHeuristicHybridAStar};
 pub use plain::PlainHybridAStar;
 pub use problem::{Problem, ProblemError};
 pub use scenario::ScenarioHybridAStar;

@@ -60,12 +60,12 @@ impl OpenList {
 
     /// Adds the next node (nodes come in the order of their indices) with its priority in
     /// the anchor and in each other queue.
-    pub fn push(&mut self, node: NodeIndex, anchor: f32, others: impl Iterator<Item = f32>) {
+    pub fn push(&mut self, node: NodeIndex, anchor: f32, others: &[f32]) {
         self.anchor.push(Open { f: anchor, node });
         if !self.others.is_empty() {
             debug_assert_eq!(node as usize, self.taken.len());
             self.taken.push(false);
-            self.others.iter_mut().zip(others).for_each(|(q, f)| q.push(Open { f, node }));
+            self.others.iter_mut().zip(others).for_each(|(q, &f)| q.push(Open { f, node }));
         }
     }
 
@@ -95,5 +95,40 @@ impl OpenList {
             .unwrap_or(least);
         taken[open.node as usize] = true;
         Some(open.node)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Nodes 0, 1, … with their priorities in the anchor and one other queue, as they leave.
+    fn order(slack: f32, priorities: &[(f32, f32)]) -> Vec<NodeIndex> {
+        let mut list = OpenList::with_others(1, slack);
+        for (node, &(anchor, other)) in priorities.iter().enumerate() {
+            list.push(node as NodeIndex, anchor, &[other]);
+        }
+        std::iter::from_fn(|| list.pop(|_| false)).collect()
+    }
+
+    #[test]
+    fn the_anchor_holds_the_others_back() {
+        let nodes = [(4.0, 9.0), (5.0, 7.0), (6.0, 6.0)];
+        // Within the slack the other queue decides; beyond it the anchor does, until the
+        // least of what is left has risen far enough.
+        assert_eq!(order(2.0, &nodes), [2, 1, 0]);
+        assert_eq!(order(1.25, &nodes), [0, 2, 1]);
+        assert_eq!(order(1.0, &nodes), [0, 1, 2]);
+    }
+
+    #[test]
+    fn nothing_leaves_twice_and_stale_nodes_never() {
+        let mut list = OpenList::with_others(2, 10.0);
+        for node in 0..20 {
+            list.push(node, 1.0 + node as f32, &[30.0 - node as f32, 5.0]);
+        }
+        let mut left: Vec<_> = std::iter::from_fn(|| list.pop(|n| n % 3 == 0)).collect();
+        left.sort_unstable();
+        assert_eq!(left, (0..20).filter(|n| n % 3 != 0).collect::<Vec<_>>());
     }
 }

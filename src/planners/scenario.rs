@@ -1,7 +1,13 @@
-//! Scenario-based Hybrid A*, the method `sha` (parallel spots only).
+//! Scenario-based Hybrid A*, the method `sha`: parallel spots only.
 //!
-//! The paper describes it as Hybrid A* towards an easier goal that a geometric manoeuvre
-//! of full-lock arcs from the parked pose provides.
+//! Known here from the paper's section V, which compares with it: a geometric manoeuvre of
+//! full-lock arcs out of the spot (`exit_manoeuvre.rs`) gives an easier goal, and Hybrid A*
+//! with Reeds-Shepp expansion drives there. Ours offers every end of the manoeuvre at once:
+//! they are roots of one search, priced with the way in that follows them.
+//!
+//! 1. One curve from the start to the goal set or to any exit, the cheapest free one.
+//! 2. A search to the exits, with half of the budget.
+//! 3. The search of `ha-rs` with the rest, where there is no exit or no way to one.
 
 use super::hybrid_astar::{HybridAStar, HybridAStarConfig, Leg};
 use super::{Budget, NoPath, PlanResult, Planner, Problem, exit_manoeuvre};
@@ -20,26 +26,26 @@ impl ScenarioHybridAStar {
     }
 
     fn leg(&mut self, problem: &Problem, expansions: &mut usize) -> Result<Leg, NoPath> {
-        let cost = self.search.config().cost;
+        let start = problem.start;
         let plain = self.search.goal_set(problem);
-        if let Some(leg) = self.search.direct(problem, problem.start, &plain) {
+        let mut goal = plain.clone();
+        for exit in exit_manoeuvre::exits(problem) {
+            let cost = &self.search.config().cost;
+            goal.add_preparatory(exit.pose, exit.way_in, &problem.vehicle, cost);
+        }
+        if let Some(leg) = self.search.direct(problem, start, &goal) {
             return Ok(leg);
         }
-        let mut goal = crate::planners::analytic::GoalSet::single(problem.goal);
-        for exit in exit_manoeuvre::exits(problem) {
-            goal.add_preparatory(exit.pose, exit.way_in, &problem.vehicle, &cost);
-        }
         if let Some(exits) = goal.only_preparatory() {
-            // The plain search is left its share.
             let reserve = *expansions / 2;
             *expansions -= reserve;
-            let leg = self.search.leg(problem, problem.start, &exits, expansions);
+            let leg = self.search.search(problem, start, &exits, None, expansions);
             *expansions += reserve;
             if leg.is_ok() {
                 return leg;
             }
         }
-        self.search.search(problem, problem.start, &plain, None, expansions)
+        self.search.search(problem, start, &plain, None, expansions)
     }
 }
 

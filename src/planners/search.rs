@@ -6,7 +6,7 @@
 //! the cost from the start to the node.
 
 use crate::curves::Segment;
-use crate::geometry::{Aabb, Pose, Vec2, wrap_angle};
+use crate::geometry::{Aabb, Pose, wrap_angle};
 use crate::vehicle::{Gear, Vehicle};
 use crate::world::collision::{BodyFrame, Sweep};
 
@@ -15,7 +15,7 @@ use super::cost::{CostModel, DriveState};
 use super::cost_to_go::CostToGo;
 use super::hybrid_astar::{HybridAStarConfig, Resolution, inscribed_radius};
 use super::lattice::Lattice;
-use super::multi_heuristic::Guide;
+use super::multi_heuristic::Guides;
 use super::nonholonomic::NonHolonomic;
 pub(super) use super::open::NodeIndex;
 use super::open::OpenList;
@@ -61,7 +61,7 @@ pub(super) struct Search {
     primitives: Vec<Primitive>,
     start: Pose,
     weight: f32,
-    guides: Vec<Guide>,
+    guides: Option<Guides>,
     enclosed: bool,
     /// Expansions since a curve was last tried.
     since_curve: u32,
@@ -74,8 +74,6 @@ pub(super) struct Estimate {
     pub grid: f32,
     /// With the vehicle's turning circle, without obstacles: the least Reeds-Shepp cost.
     pub curve: f32,
-    /// Angle between the pose's axis and the direction in which `grid` falls, radians.
-    pub misaligned: f32,
 }
 
 impl Estimate {
@@ -86,11 +84,10 @@ impl Estimate {
 }
 
 impl Search {
-    /// A search with one more queue for each of `guides`, which may go beyond the anchor's
-    /// least priority by the factor `slack`.
-    pub fn guided(guides: Vec<Guide>, slack: f32) -> Self {
-        let open = OpenList::with_others(guides.len(), slack);
-        Self { open, guides, ..Self::default() }
+    /// A search with one more queue for each estimate of `guides`.
+    pub fn guided(guides: Guides) -> Self {
+        let open = OpenList::with_others(Guides::COUNT, guides.slack());
+        Self { open, guides: Some(guides), ..Self::default() }
     }
 
     /// Starts a search from `goal` to `start` within `domain`.
@@ -105,6 +102,9 @@ impl Search {
     ) {
         let vehicle = &problem.vehicle;
         self.start = start;
+        if let Some(guides) = &mut self.guides {
+            guides.reset(problem);
+        }
         self.weight = config.heuristic_weight as f32;
         self.nodes.clear();
         self.open.clear();
@@ -240,42 +240,26 @@ impl Search {
     fn push(&mut self, node: Node, estimate: Estimate) {
         let index = self.nodes.len() as NodeIndex;
         self.nodes.push(node);
-        let others = self.guides.iter().map(|guide| node.cost + guide.priority(estimate));
-        self.open.push(index, node.cost + self.weight * node.to_come, others);
+        let anchor = node.cost + self.weight * node.to_come;
+        match &self.guides {
+            None => self.open.push(index, anchor, &[]),
+            Some(guides) => {
+                let others =
+                    guides.estimates(estimate, node.pose).map(|to_come| node.cost + to_come);
+                self.open.push(index, anchor, &others);
+            }
+        }
     }
 
     /// Estimates the cost from the start to `pose`.
     fn estimate_to_come(&mut self, pose: Pose, vehicle: &Vehicle, model: &CostModel) -> Estimate {
         let per_metre = model.forward.min(model.backward);
-        let distance = self.cost_to_go.distance(pose.position());
-        if !distance.is_finite() {
-            return Estimate { grid: f32::INFINITY, curve: 0.0, misaligned: 0.0 };
+        let grid = self.cost_to_go.distance(pose.position()) * per_metre;
+        if !grid.is_finite() {
+            return Estimate { grid: f32::INFINITY, curve: 0.0 };
         }
         let curve = self.nonholonomic.cost(self.start.relative(pose), vehicle, model);
-        let misaligned = if self.guides.is_empty() { 0.0 } else { self.misaligned(pose, distance) };
-        Estimate {
-            grid: (distance * per_metre) as f32,
-            curve: curve as f32,
-            misaligned: misaligned as f32,
-        }
-    }
-
-    fn misaligned(&mut self, pose: Pose, here: f64) -> f64 {
-        const REACH: f64 = 1.0;
-        let p = pose.position();
-        let mut fall = |dx: f64, dy: f64| {
-            let at = self.cost_to_go.distance(Vec2::new(p.x + dx, p.y + dy));
-            if at.is_finite() { here - at } else { -REACH }
-        };
-        let x = fall(REACH, 0.0) - fall(-REACH, 0.0);
-        let y = fall(0.0, REACH) - fall(0.0, -REACH);
-        if x == 0.0 && y == 0.0 {
-            return 0.0;
-        }
-        let (sin, cos) = pose.sin_cos();
-        // Either end of the car may lead.
-        let (along, across) = (x * cos + y * sin, y * cos - x * sin);
-        across.abs().atan2(along.abs())
+        Estimate { grid: grid as f32, curve: curve as f32 }
     }
 
     /// The motions from `node` to the goal, in driving order, and the root's goal-set entry.
