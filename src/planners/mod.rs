@@ -1,9 +1,11 @@
 //! Planners: from a [`Problem`] to a path or a reason why there is none.
 //!
 //! Every method of a table, learnt or not, meets the evaluation as a [`Planner`].
-//! The search core is in [`hybrid_astar`]; its parts are `search` (nodes and
-//! expansion), `open` (queues), `lattice` (visited states), `cost_to_go` and `nonholonomic` (the two heuristics),
-//! [`analytic`] (Reeds-Shepp expansion) and [`cost`].
+//! The search core is in [`hybrid_astar`]; its parts are `search` (nodes and expansion),
+//! `open` (queues), `lattice` (visited states), `cost_to_go` and `nonholonomic` (the two
+//! heuristics), [`analytic`] (Reeds-Shepp expansion) and [`cost`]. Its variants are
+//! [`PlainHybridAStar`] (no curves), [`MultiHeuristicHybridAStar`] and
+//! [`ScenarioHybridAStar`] (parallel spots).
 
 pub mod analytic;
 pub mod cost;

@@ -4,9 +4,11 @@
 //! Autonomous Parking: Multi-Heuristic Hybrid A*", arXiv 2210.08828, 2022, which puts
 //! S. Aine et al., "Multi-Heuristic A*", 2014 (the shared variant, SMHA*) on the lattice of
 //! Hybrid A*. All queues hold the same nodes with the same costs. The anchor's order is that
-//! of `ha-rs`; the others follow [`Guides`], estimates that may be too high. They take turns, each
-//! as long as its least priority is at most w2 times the anchor's (`open.rs`). Everything
-//! else is `ha-rs`: goal set, lattices, cost, and the first free curve ends the search.
+//! of `ha-rs`; the others follow [`Guides`], estimates that may be too high. They take
+//! turns, each as long as its least priority is at most w2 times the anchor's (`open.rs`).
+//! Everything else is `ha-rs`: goal set, lattices, cost, and the first free curve ends the
+//! search. A departure: a node reached more cheaply later may be expanded again from any
+//! queue, where SMHA* leaves that to the anchor; the bound below does not depend on it.
 //!
 //! **Bound.** Wherever a node is taken from, its cost is at most w2 times the anchor's
 //! least priority, hence at most w1·w2 times the cost of the cheapest path of the lattice
@@ -14,8 +16,8 @@
 //! for the way from that node to the goal. The curve that joins it to the start lies
 //! outside of the bound, as it does for every method here that ends with a curve.
 //!
-//! The guides are ours, made for the two places where the anchor's heuristic misleads:
-//! neither of its halves knows that a car in a narrow spot cannot turn towards the start.
+//! The guides are ours: neither half of the anchor's heuristic knows that a car in a narrow
+//! spot cannot turn towards the start.
 
 use serde::{Deserialize, Serialize};
 
