@@ -38,7 +38,9 @@ pub(super) struct Exit {
     pub way_in: Vec<Segment>,
 }
 
-/// Exits from the goal of `problem`, the fewest arcs first. Every `way_in` is free.
+/// Exits from the goal of `problem`: those of the manoeuvre that begins right there, then
+/// those after a straight back. Every `way_in` is free. The goal must lie in a parallel
+/// spot.
 pub(super) fn exits(problem: &Problem) -> Vec<Exit> {
     let mut exits = Vec::new();
     for settle in [Settle::Here, Settle::Back] {

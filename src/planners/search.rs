@@ -61,6 +61,7 @@ pub(super) struct Search {
     primitives: Vec<Primitive>,
     start: Pose,
     weight: f32,
+    /// What orders the other queues; `None` for a single queue.
     guides: Option<Guides>,
     enclosed: bool,
     /// Expansions since a curve was last tried.
