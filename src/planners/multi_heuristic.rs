@@ -36,7 +36,7 @@ pub struct MultiHeuristicConfig {
     pub slack: f64,
     /// Inflation of the anchor's estimate in the greedy queue, a factor.
     pub inflation: f64,
-    /// Cost per metre that nose or tail stand in the spot, in both of the other queues.
+    /// Cost per metre that nose or tail stand in a parallel spot, in both of the other queues.
     pub depth: f64,
 }
 
@@ -51,14 +51,14 @@ impl Default for MultiHeuristicConfig {
 /// 1. the *sum* of the two halves of the anchor's estimate (which takes the larger), and
 /// 2. *greedily* the anchor's estimate times the inflation,
 ///
-/// each plus a price per metre for how deep nose and tail stand in the spot. Leaving a
-/// narrow spot takes changes of gear that no other estimate foresees; this one rewards what
-/// they gain.
+/// each plus a price per metre for how deep nose and tail stand in a parallel spot. Leaving
+/// a narrow one takes changes of gear that no other estimate foresees; this one rewards
+/// what they gain.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Guides {
     config: MultiHeuristicConfig,
     vehicle: Vehicle,
-    /// y from which on the middle of nose or tail is out of the spot, planning frame.
+    /// y from which on the middle of nose or tail is out of the spot, planning frame, metres.
     border: f64,
 }
 
@@ -75,14 +75,16 @@ impl Guides {
         self.config.slack as f32
     }
 
-    /// Takes over car and spot of `problem`. Without a known spot nothing is deep.
+    /// Takes over car and spot of `problem`. Only parallel spots are deep: a car leaves a
+    /// bay straight, which needs no reward.
     pub fn reset(&mut self, problem: &Problem) {
         let v = problem.vehicle;
-        // In the spot frame the lane lies at +y: out is what stands half a car's width
-        // beyond the parked body.
-        let reach = |kind: ParkingType| if kind.is_bay() { v.length } else { v.width } / 2.0;
-        let border = |kind| v.body_center(problem.goal).y + reach(kind) + v.width / 2.0;
-        self.border = problem.kind.map_or(f64::NEG_INFINITY, border);
+        // In the spot frame the lane lies at +y: out is what stands a car's width beside the
+        // parked car.
+        self.border = match problem.kind {
+            Some(ParkingType::Parallel) => problem.goal.y + v.width,
+            _ => f64::NEG_INFINITY,
+        };
         self.vehicle = v;
     }
 
@@ -129,7 +131,7 @@ mod tests {
     use crate::world::cell::{Cell, Grid};
 
     #[test]
-    fn depth_falls_to_nothing_on_the_way_out() {
+    fn a_parked_car_is_deep_in_parallel_spots_only() {
         let vehicle = Vehicle::default();
         for kind in ParkingType::ALL {
             let cell = Cell { kind, lane_width: 6.0, spot_width: 7.0, dead_end: 12.0 };
@@ -138,7 +140,8 @@ mod tests {
             let mut guides = Guides::new(MultiHeuristicConfig::default());
             guides.reset(&problem);
             let parked = guides.depth(problem.goal);
-            assert!(parked > vehicle.width, "{kind}: {parked}");
+            let deep = if kind.is_bay() { 0.0 } else { 2.0 * vehicle.width };
+            assert!((parked - deep).abs() < 1e-9, "{kind}: {parked}");
             assert_eq!(guides.depth(start), 0.0, "{kind}");
             let estimate = Estimate { grid: 10.0, curve: 12.0 };
             assert_eq!(guides.estimates(estimate, start), [22.0, 18.0]);
