@@ -71,10 +71,10 @@ fn a_missing_scene_and_a_wrong_method_are_refused() {
         .code(2)
         .stderr(contains("a-star").and(contains("ha-rs")).and(contains("knn-n3p")));
     command("n3p-plan", dir.path())
-        .args(["--scene", "s.json", "--method", "sha"])
+        .args(["--scene", "s.json", "--method", "rl-simple"])
         .assert()
         .code(2)
-        .stderr(contains("not available in this version"));
+        .stderr(contains("not available in this version").and(contains("mhha")));
     command("n3p-plan", dir.path())
         .args(["--scene", "s.json", "--method", "n3p"])
         .assert()
@@ -129,6 +129,28 @@ fn no_path_is_exit_code_3_with_a_reason() {
         .assert()
         .code(3)
         .stdout(contains("no path by ha-rs"));
+}
+
+#[test]
+fn a_method_for_other_spots_says_so_and_does_not_fail() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("s.json"), SCENE).unwrap();
+    command("n3p-plan", dir.path())
+        .args(["--scene", "s.json", "--method", "sha"])
+        .assert()
+        .code(3)
+        .stdout(contains("no path by sha: not applicable"));
+    command("n3p-eval", dir.path())
+        .args(["--count", "1", "--methods", "ha-rs,sha", "--out", "out"])
+        .assert()
+        .success()
+        .stdout(contains("No failures in 12 rows"));
+    let rows = rows::read_csv(&dir.path().join("out/rows.csv")).unwrap();
+    assert_eq!(rows.len(), 18, "rows are kept");
+    let report = std::fs::read_to_string(dir.path().join("out/report.md")).unwrap();
+    assert!(report.contains("`sha`: 3 of 3 solved, not applicable to 6 others"), "{report}");
+    let lines = report.lines().filter(|l| l.contains("| sha | this run |"));
+    assert!(lines.into_iter().all(|l| l.starts_with("| parallel |")), "{report}");
 }
 
 #[test]
@@ -207,7 +229,9 @@ fn eval_prints_json() {
         .success();
     let json: serde_json::Value = serde_json::from_slice(&output.get_output().stdout).unwrap();
     assert_eq!(json["rows"][0]["type"], "parallel");
-    assert_eq!(json["groups"][0]["summaries"][0]["method"], "ha-rs");
+    let summaries = json["groups"][0]["summaries"].as_array().unwrap();
+    let methods: Vec<_> = summaries.iter().map(|s| s["method"].as_str().unwrap()).collect();
+    assert_eq!(methods, ["ha", "ha-rs", "ha-hold", "mhha", "sha"], "all that need no model");
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0, "nothing without --out");
 }
 

@@ -27,7 +27,7 @@ struct Args {
     /// Difficulty of the generated scenes [default: all].
     #[arg(long, value_enum, conflicts_with = "scenes")]
     level: Option<Level>,
-    /// Methods, separated by commas [default: ha-rs and all that the models allow].
+    /// Methods, separated by commas [default: all that the models allow].
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     methods: Vec<Method>,
     /// Generated scenes per type and level.

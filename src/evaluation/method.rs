@@ -6,7 +6,10 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use super::models::Models;
-use crate::planners::{HybridAStar, HybridAStarConfig, Planner};
+use crate::planners::{
+    HybridAStar, HybridAStarConfig, MultiHeuristicHybridAStar, PlainHybridAStar, Planner,
+    ScenarioHybridAStar,
+};
 use crate::selectors::guided::GuidedPlanner;
 use crate::world::UnknownName;
 
@@ -20,7 +23,7 @@ pub enum Method {
     HaRs,
     /// The best of the first five solutions of Hybrid A*.
     HaHold,
-    /// Multi-heuristic A* over the hybrid lattice.
+    /// Multi-heuristic A* over the hybrid lattice, with Reeds-Shepp expansion.
     Mhha,
     /// Hybrid A* to the end of a geometric exit manoeuvre (parallel only).
     Sha,
@@ -57,7 +60,7 @@ pub enum MethodError {
     NotAvailable(Method),
 }
 
-const AVAILABLE: &str = "ha-rs, ha-hold, mlp-n3p, knn-n3p, n3p";
+const AVAILABLE: &str = "ha, ha-rs, ha-hold, mhha, sha, mlp-n3p, knn-n3p, n3p";
 
 /// How many solutions the paper's HA* Hold compares.
 const HOLD_SOLUTIONS: usize = 5;
@@ -134,8 +137,11 @@ impl Method {
         let no_model = |model, example| MethodError::NoModel { method: self, model, example };
         let selector = models.selector(self);
         match self {
+            Self::Ha => Ok(Box::new(PlainHybridAStar::new(*config))),
             Self::HaRs => Ok(Box::new(HybridAStar::new(*config))),
             Self::HaHold => Ok(Box::new(HybridAStar::hold(*config, HOLD_SOLUTIONS))),
+            Self::Mhha => Ok(Box::new(MultiHeuristicHybridAStar::new(*config))),
+            Self::Sha => Ok(Box::new(ScenarioHybridAStar::new(*config))),
             Self::KnnN3p => {
                 let selector = selector.ok_or_else(|| no_model("knn", "knn.bin"))?;
                 Ok(Box::new(GuidedPlanner::paper(self.name(), selector, *config)))
@@ -148,9 +154,7 @@ impl Method {
                 let selector = selector.ok_or_else(|| no_model("knn", "knn.bin"))?;
                 Ok(Box::new(GuidedPlanner::ranked(self.name(), selector, *config)))
             }
-            Self::Ha | Self::Mhha | Self::Sha | Self::RlSimple | Self::RlEval => {
-                Err(MethodError::NotAvailable(self))
-            }
+            Self::RlSimple | Self::RlEval => Err(MethodError::NotAvailable(self)),
         }
     }
 }
@@ -205,8 +209,10 @@ mod tests {
         let build = |m: Method| m.build(&Models::default(), &HybridAStarConfig::default());
         let message = build(Method::N3p).err().unwrap().to_string();
         assert!(message.contains("--model") && message.contains("n3p-train knn"), "{message}");
-        let message = build(Method::Sha).err().unwrap().to_string();
+        let message = build(Method::RlEval).err().unwrap().to_string();
         assert!(message.contains("not available in this version"), "{message}");
-        assert_eq!(Method::available(&Models::default()), [Method::HaRs, Method::HaHold]);
+        let available = Method::available(&Models::default());
+        assert_eq!(available, Method::ALL[..5]);
+        assert!(available.iter().all(|m| m.is_graph_search() && AVAILABLE.contains(m.name())));
     }
 }

@@ -86,8 +86,10 @@ pub struct Group {
     pub summaries: Vec<Summary>,
 }
 
-/// Summarises `rows` by level (hardest last) and type. `seed` drives the resampling.
+/// Summarises the `rows` whose method applies to their scene by level (hardest last) and
+/// type. `seed` drives the resampling.
 pub fn summarise(rows: &[Row], seed: u64) -> Vec<Group> {
+    let rows: Vec<&Row> = rows.iter().filter(|r| r.applies()).collect();
     let mut keys: Vec<_> = rows.iter().map(|r| (r.level, r.kind)).collect();
     // Types as in every table, scenes of no known type last.
     let place = |kind| ParkingType::ALL.iter().position(|k| Some(*k) == kind);
@@ -96,7 +98,7 @@ pub fn summarise(rows: &[Row], seed: u64) -> Vec<Group> {
     let mut groups = Vec::new();
     for (g, (level, kind)) in keys.into_iter().enumerate() {
         let mut methods: Vec<(&str, Vec<&Row>)> = Vec::new();
-        for row in rows.iter().filter(|r| (r.level, r.kind) == (level, kind)) {
+        for &row in rows.iter().filter(|r| (r.level, r.kind) == (level, kind)) {
             match methods.iter_mut().find(|(name, _)| *name == row.method) {
                 Some((_, list)) => list.push(row),
                 None => methods.push((&row.method, vec![row])),
@@ -215,6 +217,7 @@ fn percentile(sorted: &[f64], q: f64) -> f64 {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::planners::NoPath;
 
     /// A solved (or failed) row.
     pub fn row(scene: &str, method: &str, plan_time_s: f64, ok: bool) -> Row {
@@ -248,6 +251,21 @@ pub(super) mod tests {
         assert_eq!((s.scenes, s.fail_percent, s.min_t_s, s.mean_t_s), (10, 10.0, 0.0, 4.5));
         assert!(s.mean_t_interval_s.low < 4.5 && 4.5 < s.mean_t_interval_s.high);
         assert!(s.speed_up.is_none());
+    }
+
+    #[test]
+    fn what_does_not_apply_is_no_failure_and_no_reference() {
+        let mut rows: Vec<Row> =
+            (0..4).map(|i| row(&format!("s{i}"), "ha-rs", 1.0, true)).collect();
+        rows.extend((0..4).map(|i| Row {
+            reason: NoPath::NotApplicable.to_string(),
+            ..row(&format!("s{i}"), "sha", 1e-6, false)
+        }));
+        let groups = summarise(&rows, 1);
+        let methods: Vec<_> = groups[0].summaries.iter().map(|s| s.method.as_str()).collect();
+        assert_eq!(methods, ["ha-rs"]);
+        assert!(groups[0].summaries[0].speed_up.is_none());
+        assert!(summarise(&rows[4..], 1).is_empty());
     }
 
     #[test]

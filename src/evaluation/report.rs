@@ -66,7 +66,8 @@ pub fn text(rows: &[Row], seed: u64) -> String {
     let _ = writeln!(out, "{}", table::speed_ups(&groups).text());
     let failures = table::failures(rows);
     if failures.rows.is_empty() {
-        let _ = writeln!(out, "No failures in {} rows.", rows.len());
+        let applicable = rows.iter().filter(|r| r.applies()).count();
+        let _ = writeln!(out, "No failures in {applicable} rows.");
     } else {
         let _ = writeln!(out, "{}", failures.text());
     }
@@ -128,12 +129,16 @@ fn headline(groups: &[Group], rows: &[Row]) -> String {
     }
     let mut out = String::new();
     for method in methods {
-        let mine: Vec<&Row> = rows.iter().filter(|r| r.method == method).collect();
+        let (mine, others): (Vec<&Row>, Vec<&Row>) =
+            rows.iter().filter(|r| r.method == method).partition(|r| r.applies());
         let solved = mine.iter().filter(|r| r.ok).count();
         let rejected = mine.iter().filter(|r| !r.checked.is_empty() && r.checked != "ok").count();
         let _ = write!(out, "- `{method}`: {solved} of {} solved", mine.len());
         if rejected > 0 {
             let _ = write!(out, ", **{rejected} rejected by the independent check**");
+        }
+        if !others.is_empty() {
+            let _ = write!(out, ", not applicable to {} others", others.len());
         }
         let fallbacks = mine.iter().filter(|r| r.fallback).count();
         if fallbacks > 0 {

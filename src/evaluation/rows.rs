@@ -13,6 +13,7 @@ use parquet::arrow::ArrowWriter;
 use serde::{Deserialize, Serialize};
 
 use crate::files::{reason, write_whole};
+use crate::planners::NoPath;
 use crate::world::{Level, ParkingType};
 
 /// The result of one method on one scene. Columns that describe a path are empty where
@@ -74,6 +75,12 @@ impl Row {
         "checked",
         "route",
     ];
+
+    /// Whether the method is made for such scenes. Rows of one that is not are kept, but they
+    /// are no failures and enter no table.
+    pub fn applies(&self) -> bool {
+        self.reason != NoPath::NotApplicable.to_string()
+    }
 
     /// Scene and method, which no two rows of a run share.
     pub fn key(&self) -> (&str, &str) {

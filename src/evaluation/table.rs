@@ -154,9 +154,9 @@ pub fn speed_ups(groups: &[Group]) -> Table {
     }
 }
 
-/// Every row that failed, with its reason.
+/// Every row that failed, with its reason. A method that does not apply has not failed.
 pub fn failures(rows: &[Row]) -> Table {
-    let failed = rows.iter().filter(|r| !r.ok).map(|r| {
+    let failed = rows.iter().filter(|r| !r.ok && r.applies()).map(|r| {
         let why = if r.checked.is_empty() || r.checked == "ok" {
             r.reason.clone()
         } else {

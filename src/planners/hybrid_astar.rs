@@ -13,13 +13,14 @@
 use serde::{Deserialize, Serialize};
 
 use crate::curves::{Path, Segment};
-use crate::geometry::{Aabb, Pose};
+use crate::geometry::{Aabb, Pose, signed_angle};
 use crate::vehicle::Vehicle;
 
 use super::analytic::{AnalyticExpansion, AnalyticTail};
 pub(crate) use super::analytic::{Connection, Entry, GoalSet};
 use super::cost::CostModel;
-use super::search::{Search, Stop};
+use super::multi_heuristic::{Guides, MultiHeuristicConfig};
+use super::search::Search;
 use super::{Budget, NoPath, PlanResult, Planner, Problem};
 
 /// Settings of the search.
@@ -44,6 +45,35 @@ pub struct HybridAStarConfig {
     pub entry_max: f64,
     /// Weight of the heuristic; 1 is A*.
     pub heuristic_weight: f64,
+    /// What counts as arrived for the method `ha`, which has no curves to arrive exactly.
+    pub goal_region: GoalRegion,
+    /// The queues of the method `mhha`.
+    pub multi_heuristic: MultiHeuristicConfig,
+}
+
+/// How near a search without curves must come before its path may be bent to fit (see
+/// `joint.rs`).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct GoalRegion {
+    /// Largest distance, metres.
+    pub position: f64,
+    /// Largest difference of headings, radians.
+    pub heading: f64,
+}
+
+impl Default for GoalRegion {
+    fn default() -> Self {
+        Self { position: 0.25, heading: 5_f64.to_radians() }
+    }
+}
+
+impl GoalRegion {
+    /// Whether `pose` lies in the region around `target`.
+    pub fn contains(&self, target: Pose, pose: Pose) -> bool {
+        pose.distance(target) <= self.position
+            && signed_angle(target.heading, pose.heading).abs() <= self.heading
+    }
 }
 
 /// How finely a search looks.
@@ -97,6 +127,8 @@ impl Default for HybridAStarConfig {
             entry_step: 1.0,
             entry_max: 5.0,
             heuristic_weight: 1.0,
+            goal_region: GoalRegion::default(),
+            multi_heuristic: MultiHeuristicConfig::default(),
         }
     }
 }
@@ -111,6 +143,11 @@ impl HybridAStarConfig {
             ("entry_step", self.entry_step, 0.05, 10.0),
             ("entry_max", self.entry_max, 0.0, 50.0),
             ("heuristic_weight", self.heuristic_weight, 0.0, 100.0),
+            ("goal_region.position", self.goal_region.position, 0.01, 5.0),
+            ("goal_region.heading", self.goal_region.heading, 0.001, 1.6),
+            ("multi_heuristic.slack", self.multi_heuristic.slack, 1.0, 100.0),
+            ("multi_heuristic.inflation", self.multi_heuristic.inflation, 0.0, 100.0),
+            ("multi_heuristic.depth", self.multi_heuristic.depth, 0.0, 100.0),
         ] {
             if !(v.is_finite() && (low..=high).contains(&v)) {
                 return Err(format!(
@@ -119,6 +156,53 @@ impl HybridAStarConfig {
             }
         }
         self.resolutions.iter().try_for_each(Resolution::validate)
+    }
+
+    /// The goal of `problem` with the entry straights that are free.
+    pub(super) fn goal_set(&self, problem: &Problem) -> GoalSet {
+        let mut goal = GoalSet::single(problem.goal);
+        self.add_straights(problem, 0.0, &mut goal);
+        goal
+    }
+
+    fn add_straights(&self, problem: &Problem, offset: f64, goal: &mut GoalSet) {
+        if self.entry_straight {
+            let (step, longest) = (self.entry_step, self.entry_max);
+            goal.add_straights(problem, &self.cost, offset, step, longest);
+        }
+    }
+
+    /// Where a search may go: around start and goal, within the bounds.
+    pub(super) fn domain(&self, problem: &Problem, start: Pose, goal: Pose) -> Aabb {
+        let around = Aabb::around([start.position(), goal.position()]);
+        let mut domain = around.inflated(self.domain_margin);
+        if let Some(bounds) = problem.collision.bounds_aabb() {
+            domain.min = domain.min.sup(&bounds.min);
+            domain.max = domain.max.inf(&bounds.max);
+        }
+        domain
+    }
+
+    /// Runs `search` on each lattice, coarse to fine, until it finds something or the goal
+    /// turns out to be enclosed. `expansions` is reduced by what was spent: finer lattices
+    /// are left their share even when a coarse one goes on and on.
+    pub(super) fn coarse_to_fine<T>(
+        &self,
+        expansions: &mut usize,
+        mut search: impl FnMut(&Resolution, &mut usize) -> Result<T, NoPath>,
+    ) -> Result<T, NoPath> {
+        let mut result = Err(NoPath::BudgetSpent);
+        for (i, resolution) in self.resolutions.iter().enumerate() {
+            let last = i + 1 == self.resolutions.len();
+            let reserve = if last { 0 } else { *expansions / 2 };
+            *expansions -= reserve;
+            result = search(resolution, expansions);
+            *expansions += reserve;
+            if !matches!(result, Err(NoPath::BudgetSpent | NoPath::Exhausted)) {
+                break;
+            }
+        }
+        result
     }
 }
 
@@ -156,6 +240,11 @@ impl HybridAStar {
         Self { config, solutions: solutions.max(1), queue, analytic }
     }
 
+    /// The first solution found by a search that follows `guides` as well.
+    pub(super) fn guided(config: HybridAStarConfig, guides: Guides) -> Self {
+        Self { queue: Search::guided(guides), ..Self::new(config) }
+    }
+
     /// The settings.
     pub fn config(&self) -> &HybridAStarConfig {
         &self.config
@@ -163,9 +252,7 @@ impl HybridAStar {
 
     /// The goal of `problem` with the entry straights that are free.
     pub(crate) fn goal_set(&self, problem: &Problem) -> GoalSet {
-        let mut goal = GoalSet::single(problem.goal);
-        self.add_straights(problem, 0.0, &mut goal);
-        goal
+        self.config.goal_set(problem)
     }
 
     /// [`HybridAStar::goal_set`] that also has the entries of a cell whose goal lies `shift`
@@ -173,16 +260,9 @@ impl HybridAStar {
     pub(crate) fn goal_set_of_cell(&self, problem: &Problem, shift: f64) -> GoalSet {
         let mut goal = self.goal_set(problem);
         if shift > 0.0 {
-            self.add_straights(problem, shift, &mut goal);
+            self.config.add_straights(problem, shift, &mut goal);
         }
         goal
-    }
-
-    fn add_straights(&self, problem: &Problem, offset: f64, goal: &mut GoalSet) {
-        let c = &self.config;
-        if c.entry_straight {
-            goal.add_straights(problem, &c.cost, offset, c.entry_step, c.entry_max);
-        }
     }
 
     /// The cheapest free way from `from` into `goal`, without any search.
@@ -227,19 +307,12 @@ impl HybridAStar {
         expansions: &mut usize,
     ) -> Result<Leg, NoPath> {
         let mut best = direct;
-        let mut result = Err(NoPath::BudgetSpent);
-        for (i, resolution) in self.config.resolutions.into_iter().enumerate() {
-            // Finer lattices are left their share even when a coarse one goes on and on.
-            let last = i + 1 == self.config.resolutions.len();
-            let reserve = if last { 0 } else { *expansions / 2 };
-            *expansions -= reserve;
-            result = self.search_leg(&resolution, problem, start, goal, &mut best, expansions);
-            *expansions += reserve;
-            if best.is_some() || result == Err(NoPath::Enclosed) {
-                break;
-            }
-        }
-        best.map_or_else(|| Err(result.err().unwrap_or(NoPath::Exhausted)), Ok)
+        let config = self.config;
+        let result = config.coarse_to_fine(expansions, |resolution, expansions| {
+            let result = self.search_leg(resolution, problem, start, goal, &mut best, expansions);
+            if best.is_some() { Ok(()) } else { result }
+        });
+        result.map(|()| best.expect("a search that succeeds leaves a leg"))
     }
 
     /// One search at one resolution, for something cheaper than `best`.
@@ -253,7 +326,7 @@ impl HybridAStar {
         expansions: &mut usize,
     ) -> Result<(), NoPath> {
         let mut wanted = self.solutions - usize::from(best.is_some());
-        let domain = self.domain(problem, start, goal.pose);
+        let domain = self.config.domain(problem, start, goal.pose);
         self.queue.begin(&self.config, resolution, problem, domain, start, goal);
         while let Some(node) = self.queue.pop() {
             let bound = best.as_ref().map_or(f64::INFINITY, |leg| leg.cost);
@@ -284,10 +357,7 @@ impl HybridAStar {
             }
             self.queue.expand(node, goal, &self.config, problem);
         }
-        Err(match self.queue.stop() {
-            Stop::Enclosed => NoPath::Enclosed,
-            Stop::Exhausted => NoPath::Exhausted,
-        })
+        Err(self.queue.stop())
     }
 
     /// The preparatory pose of a solved `path`, and the curve from there to the goal.
@@ -350,17 +420,6 @@ impl HybridAStar {
         }
         best.map(|(_, i)| path.segments[i..].to_vec())
     }
-
-    /// Where the search may go: around start and goal, within the bounds.
-    fn domain(&self, problem: &Problem, start: Pose, goal: Pose) -> Aabb {
-        let around = Aabb::around([start.position(), goal.position()]);
-        let mut domain = around.inflated(self.config.domain_margin);
-        if let Some(bounds) = problem.collision.bounds_aabb() {
-            domain.min = domain.min.sup(&bounds.min);
-            domain.max = domain.max.inf(&bounds.max);
-        }
-        domain
-    }
 }
 
 impl Planner for HybridAStar {
@@ -391,4 +450,34 @@ fn manoeuvre_begin(path: &Path) -> usize {
 /// The largest disc around the rear axle inside every footprint, metres.
 pub(super) fn inscribed_radius(vehicle: &Vehicle) -> f64 {
     (vehicle.width / 2.0).min(vehicle.rear_overhang).min(vehicle.front_extent())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn the_goal_region_has_the_tolerances_it_says() {
+        let region = GoalRegion { position: 0.2, heading: 0.1 };
+        let target = Pose::new(1.0, 2.0, PI - 0.02);
+        let within = |dx, dy, turn| {
+            region.contains(target, Pose::new(1.0 + dx, 2.0 + dy, target.heading + turn))
+        };
+        assert!(within(0.0, 0.0, 0.0) && within(0.19, 0.0, -0.09) && within(0.1, -0.1, 0.09));
+        assert!(!within(0.15, 0.15, 0.0) && !within(0.0, 0.0, 0.11) && !within(0.0, 0.0, PI));
+        // Beyond π the heading begins again at −π.
+        assert!(region.contains(target, Pose { heading: 0.05 - PI, ..target }));
+    }
+
+    #[test]
+    fn settings_out_of_range_are_named() {
+        let mut config = HybridAStarConfig::default();
+        assert_eq!(config.validate(), Ok(()));
+        config.goal_region.position = f64::NAN;
+        assert!(config.validate().unwrap_err().contains("planner.goal_region.position is NaN"));
+        config = HybridAStarConfig::default();
+        config.multi_heuristic.slack = 0.5;
+        assert!(config.validate().unwrap_err().contains("planner.multi_heuristic.slack is 0.5"));
+    }
 }

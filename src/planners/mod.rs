@@ -1,23 +1,34 @@
 //! Planners: from a [`Problem`] to a path or a reason why there is none.
 //!
 //! Every method of a table, learnt or not, meets the evaluation as a [`Planner`].
-//! The search core is in [`hybrid_astar`]; its parts are `search` (queue and
-//! nodes), `lattice` (visited states), `cost_to_go` and `nonholonomic` (the two heuristics),
-//! [`analytic`] (Reeds-Shepp expansion) and [`cost`].
+//! The search core is in [`hybrid_astar`]; its parts are `search` (nodes and expansion),
+//! `open` (queues), `lattice` (visited states), `cost_to_go` and `nonholonomic` (the two
+//! heuristics), [`analytic`] (Reeds-Shepp expansion) and [`cost`]. Its variants are
+//! [`PlainHybridAStar`] (no curves), [`MultiHeuristicHybridAStar`] and
+//! [`ScenarioHybridAStar`] (parallel spots). [`library`] does without any search.
 
 pub mod analytic;
 pub mod cost;
 mod cost_to_go;
+mod exit_manoeuvre;
 pub mod hybrid_astar;
+mod joint;
 mod lattice;
 pub mod library;
+mod multi_heuristic;
 mod nonholonomic;
+mod open;
+mod plain;
 mod problem;
+mod scenario;
 mod search;
 
 pub use analytic::AnalyticTail;
-pub use hybrid_astar::{HybridAStar, HybridAStarConfig, Resolution};
+pub use hybrid_astar::{GoalRegion, HybridAStar, HybridAStarConfig, Resolution};
+pub use multi_heuristic::{MultiHeuristicConfig, MultiHeuristicHybridAStar};
+pub use plain::PlainHybridAStar;
 pub use problem::{Problem, ProblemError};
+pub use scenario::ScenarioHybridAStar;
 
 use crate::curves::Path;
 use crate::geometry::{Pose, signed_angle};

@@ -1,37 +1,25 @@
-//! The best-first search of Hybrid A*: open queue, node arena, expansion.
+//! The best-first search of Hybrid A*: node arena and expansion.
 //!
 //! The search runs *from the goal*: driving is reversible, and near the goal space is
 //! tight. A node's motion leads forward in time from the node to its parent, so that the
 //! way from a node to the goal is read off by walking up to the root. What is estimated is
 //! the cost from the start to the node.
 
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
-
 use crate::curves::Segment;
 use crate::geometry::{Aabb, Pose, wrap_angle};
 use crate::vehicle::{Gear, Vehicle};
 use crate::world::collision::{BodyFrame, Sweep};
 
-use super::Problem;
 use super::analytic::GoalSet;
 use super::cost::{CostModel, DriveState};
 use super::cost_to_go::CostToGo;
 use super::hybrid_astar::{HybridAStarConfig, Resolution, inscribed_radius};
 use super::lattice::Lattice;
+use super::multi_heuristic::Guides;
 use super::nonholonomic::NonHolonomic;
-
-/// Why the queue ran empty.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Stop {
-    /// The wave from the start never reaches the goal.
-    Enclosed,
-    /// Everything reachable was expanded.
-    Exhausted,
-}
-
-/// Index of a node in the arena.
-pub(super) type NodeIndex = u32;
+pub(super) use super::open::NodeIndex;
+use super::open::OpenList;
+use super::{NoPath, Problem};
 
 /// In place of a primitive: the node is a root.
 const ROOT: u32 = u32::MAX;
@@ -47,27 +35,6 @@ struct Node {
     parent: NodeIndex,
     /// Index of the motion; `ROOT` for a root.
     primitive: u32,
-}
-
-/// An open node; ordered so that the heap pops the least f, then the earliest.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Open {
-    f: f32,
-    node: NodeIndex,
-}
-
-impl Eq for Open {}
-
-impl Ord for Open {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.f.total_cmp(&self.f).then(other.node.cmp(&self.node))
-    }
-}
-
-impl PartialOrd for Open {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
 }
 
 /// A motion primitive.
@@ -87,19 +54,43 @@ struct Primitive {
 #[derive(Debug, Default)]
 pub(super) struct Search {
     nodes: Vec<Node>,
-    open: BinaryHeap<Open>,
+    open: OpenList,
     lattice: Lattice,
     cost_to_go: CostToGo,
     nonholonomic: NonHolonomic,
     primitives: Vec<Primitive>,
     start: Pose,
     weight: f32,
+    /// What orders the other queues; `None` for a single queue.
+    guides: Option<Guides>,
     enclosed: bool,
     /// Expansions since a curve was last tried.
     since_curve: u32,
 }
 
+/// What the estimate of the cost from the start to a pose is made of.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Estimate {
+    /// Among the obstacles, turning on the spot: the A* cost-to-go.
+    pub grid: f32,
+    /// With the vehicle's turning circle, without obstacles: the least Reeds-Shepp cost.
+    pub curve: f32,
+}
+
+impl Estimate {
+    /// The larger of the two estimates; infinite where the start cannot be reached.
+    pub fn cost(self) -> f32 {
+        self.grid.max(self.curve)
+    }
+}
+
 impl Search {
+    /// A search with one more queue for each estimate of `guides`.
+    pub fn guided(guides: Guides) -> Self {
+        let open = OpenList::with_others(Guides::COUNT, guides.slack());
+        Self { open, guides: Some(guides), ..Self::default() }
+    }
+
     /// Starts a search from `goal` to `start` within `domain`.
     pub fn begin(
         &mut self,
@@ -112,6 +103,9 @@ impl Search {
     ) {
         let vehicle = &problem.vehicle;
         self.start = start;
+        if let Some(guides) = &mut self.guides {
+            guides.reset(problem);
+        }
         self.weight = config.heuristic_weight as f32;
         self.nodes.clear();
         self.open.clear();
@@ -128,13 +122,14 @@ impl Search {
         }
         for (i, entry) in goal.entries().iter().enumerate() {
             let pose = Pose { heading: wrap_angle(entry.pose.heading), ..entry.pose };
-            let to_come = self.heuristic(pose, vehicle, &config.cost);
+            let estimate = self.estimate_to_come(pose, vehicle, &config.cost);
+            let to_come = estimate.cost();
             let Some(state) = self.lattice.state(pose) else { continue };
             let cost = entry.cost() as f32;
             if to_come.is_finite() && cost < self.lattice.cost(state) {
                 self.lattice.set_cost(state, cost);
                 let parent = i as NodeIndex;
-                self.push(Node { pose, cost, to_come, parent, primitive: ROOT });
+                self.push(Node { pose, cost, to_come, parent, primitive: ROOT }, estimate);
             }
         }
     }
@@ -159,20 +154,17 @@ impl Search {
 
     /// Takes the open node of least f that is still the best of its state.
     pub fn pop(&mut self) -> Option<NodeIndex> {
-        while let Some(Open { node, .. }) = self.open.pop() {
-            let n = self.nodes[node as usize];
+        let Self { nodes, lattice, open, .. } = self;
+        open.pop(|node| {
             // A cheaper way to the same state was found after this one was queued.
-            let stale = self.lattice.state(n.pose).is_some_and(|s| self.lattice.cost(s) < n.cost);
-            if !stale {
-                return Some(node);
-            }
-        }
-        None
+            let n = nodes[node as usize];
+            lattice.state(n.pose).is_some_and(|s| lattice.cost(s) < n.cost)
+        })
     }
 
     /// Why the queue is empty.
-    pub fn stop(&self) -> Stop {
-        if self.enclosed { Stop::Enclosed } else { Stop::Exhausted }
+    pub fn stop(&self) -> NoPath {
+        if self.enclosed { NoPath::Enclosed } else { NoPath::Exhausted }
     }
 
     /// Whether a curve from the start to `node` should be tried: rarely far from the start,
@@ -236,30 +228,39 @@ impl Search {
             {
                 continue;
             }
-            let to_come = self.heuristic(pose, &problem.vehicle, &config.cost);
+            let estimate = self.estimate_to_come(pose, &problem.vehicle, &config.cost);
+            let to_come = estimate.cost();
             if !to_come.is_finite() {
                 continue;
             }
             self.lattice.set_cost(lattice_state, cost);
-            self.push(Node { pose, cost, to_come, parent: node, primitive: i as u32 });
+            self.push(Node { pose, cost, to_come, parent: node, primitive: i as u32 }, estimate);
         }
     }
 
-    fn push(&mut self, node: Node) {
+    fn push(&mut self, node: Node, estimate: Estimate) {
         let index = self.nodes.len() as NodeIndex;
         self.nodes.push(node);
-        self.open.push(Open { f: node.cost + self.weight * node.to_come, node: index });
+        let anchor = node.cost + self.weight * node.to_come;
+        match &self.guides {
+            None => self.open.push(index, anchor, &[]),
+            Some(guides) => {
+                let others =
+                    guides.estimates(estimate, node.pose).map(|to_come| node.cost + to_come);
+                self.open.push(index, anchor, &others);
+            }
+        }
     }
 
-    /// The larger of the two estimates of the cost from the start to `pose`.
-    fn heuristic(&mut self, pose: Pose, vehicle: &Vehicle, model: &CostModel) -> f32 {
+    /// Estimates the cost from the start to `pose`.
+    fn estimate_to_come(&mut self, pose: Pose, vehicle: &Vehicle, model: &CostModel) -> Estimate {
         let per_metre = model.forward.min(model.backward);
-        let among_obstacles = self.cost_to_go.distance(pose.position()) * per_metre;
-        if !among_obstacles.is_finite() {
-            return f32::INFINITY;
+        let grid = self.cost_to_go.distance(pose.position()) * per_metre;
+        if !grid.is_finite() {
+            return Estimate { grid: f32::INFINITY, curve: 0.0 };
         }
         let curve = self.nonholonomic.cost(self.start.relative(pose), vehicle, model);
-        among_obstacles.max(curve) as f32
+        Estimate { grid: grid as f32, curve: curve as f32 }
     }
 
     /// The motions from `node` to the goal, in driving order, and the root's goal-set entry.

@@ -1,0 +1,102 @@
+//! The graph-search baselines on generated scenes: their paths hold, and each is what its
+//! description says.
+
+use n3p::evaluation::{Method, Models, PathFile, oracle};
+use n3p::planners::{Budget, HybridAStarConfig, NoPath, PlanResult, Problem};
+use n3p::vehicle::Vehicle;
+use n3p::world::generate::{GeneratorConfig, generate};
+use n3p::world::{Level, ParkingType, Scene};
+
+const SEED: u64 = 78;
+const SCENES: u64 = 12;
+const BUDGET: Budget = Budget { max_expansions: 200_000 };
+
+fn scenes() -> Vec<(ParkingType, Scene)> {
+    let (config, vehicle) = (GeneratorConfig::default(), Vehicle::default());
+    let settings = ParkingType::ALL.into_iter().flat_map(|k| Level::ALL.map(|l| (k, l)));
+    let of = |(k, l)| (0..SCENES).map(move |i| (k, generate(&config, &vehicle, k, l, SEED, i)));
+    settings.flat_map(of).collect()
+}
+
+/// The results of `method` on all scenes, after checking that they are certified, accepted
+/// by the independent check, and the same from a planner that never planned before.
+fn plan_all(method: Method) -> Vec<PlanResult> {
+    let build = || method.build(&Models::default(), &HybridAStarConfig::default()).unwrap();
+    let mut planner = build();
+    let plan = |(kind, scene): &(ParkingType, Scene)| {
+        let problem = Problem::new(scene).unwrap();
+        let result = planner.plan(&problem, BUDGET);
+        let again = build().plan(&problem, BUDGET);
+        let what = format!("{method} on {} (seed {SEED})", scene.name);
+        assert_eq!(result.outcome, again.outcome, "{what} depends on earlier calls");
+        assert_eq!(result.expansions, again.expansions, "{what} depends on earlier calls");
+        assert!(result.expansions <= BUDGET.max_expansions, "{what}");
+        match &result.outcome {
+            Ok(path) => {
+                assert_eq!(path.start, problem.start, "{what}");
+                let file = PathFile::new(scene, &problem.frame, path, method.name());
+                oracle::check(scene, &file).unwrap_or_else(|e| panic!("{what}: {e}"));
+            }
+            Err(reason) => {
+                let no_parallel = method == Method::Sha && *kind != ParkingType::Parallel;
+                assert_eq!(*reason == NoPath::NotApplicable, no_parallel, "{what}: {reason}");
+                assert!(no_parallel || *reason == NoPath::BudgetSpent, "{what}: {reason}");
+            }
+        }
+        result
+    };
+    scenes().iter().map(plan).collect()
+}
+
+fn nodes(results: &[PlanResult]) -> usize {
+    results.iter().map(|r| r.expansions).sum()
+}
+
+#[test]
+fn without_curves_the_search_still_arrives_exactly() {
+    let results = plan_all(Method::Ha);
+    let solved = results.iter().filter(|r| r.outcome.is_ok()).count();
+    assert!(solved * 100 >= results.len() * 95, "{solved} of {}", results.len());
+    assert!(results.iter().all(|r| r.expansions > 0), "there is no curve to end it at once");
+}
+
+#[test]
+fn more_heuristics_mean_fewer_nodes() {
+    let (one, many) = (plan_all(Method::HaRs), plan_all(Method::Mhha));
+    assert!(many.iter().all(|r| r.outcome.is_ok()));
+    assert!(nodes(&many) < nodes(&one), "{} {}", nodes(&many), nodes(&one));
+}
+
+#[test]
+fn the_exit_manoeuvre_saves_most_of_the_search() {
+    let parallel: Vec<bool> = scenes().iter().map(|(k, _)| *k == ParkingType::Parallel).collect();
+    let of_parallel = |method| -> Vec<PlanResult> {
+        plan_all(method).into_iter().zip(&parallel).filter(|(_, p)| **p).map(|(r, _)| r).collect()
+    };
+    let (plain, scenario) = (of_parallel(Method::HaRs), of_parallel(Method::Sha));
+    assert!(scenario.iter().all(|r| r.outcome.is_ok()));
+    assert!(nodes(&scenario) * 2 < nodes(&plain), "{} {}", nodes(&scenario), nodes(&plain));
+}
+
+/// The best of five is never worse than the first of them.
+#[test]
+fn holding_on_never_costs_more() {
+    let (first, best) = (plan_all(Method::HaRs), plan_all(Method::HaHold));
+    let (config, vehicle) = (HybridAStarConfig::default(), Vehicle::default());
+    let cost = |r: &PlanResult| {
+        config.cost.path(&vehicle, &r.outcome.as_ref().expect("both solve all").segments)
+    };
+    for (first, best) in first.iter().zip(&best) {
+        assert!(cost(best) <= cost(first) + 1e-3, "{} {}", cost(best), cost(first));
+    }
+}
+
+/// A budget too small for anything is told, not overdrawn.
+#[test]
+fn a_spent_budget_is_the_reason() {
+    let (_, scene) = scenes().pop().unwrap();
+    let problem = Problem::new(&scene).unwrap();
+    let mut planner = Method::Ha.build(&Models::default(), &HybridAStarConfig::default()).unwrap();
+    let result = planner.plan(&problem, Budget { max_expansions: 10 });
+    assert_eq!((result.outcome, result.expansions), (Err(NoPath::BudgetSpent), 10));
+}
