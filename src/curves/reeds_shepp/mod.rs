@@ -151,7 +151,7 @@ mod tests {
             4 => Pose::new(r(1.0).round() * reach, r(1.0).round() * reach, r(1.5).round() * PI),
             // Where words of few segments end.
             _ => (0..1 + i % 4).fold(Pose::default(), |pose, _| {
-                let length = if i % 5 == 0 { r(4.0).round() * FRAC_PI_4 } else { r(3.0) };
+                let length = if i.is_multiple_of(5) { r(4.0).round() * FRAC_PI_4 } else { r(3.0) };
                 Segment { curvature: r(1.5).round(), length }.end(pose)
             }),
         }

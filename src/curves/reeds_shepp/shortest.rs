@@ -1,9 +1,9 @@
 //! The length of the shortest word, from a quarter of the words.
 //!
-//! Time flip and reflection bring every goal to x ≥ 0 and y ≥ 0, where only 20 words and
-//! C|C|C are ever the shortest (as in doi 10.1109/TRO.2025.3554406), 12 or 13 of them for
-//! either sign of the heading. Which, was counted over random goals; the tests compare the
-//! result with all words.
+//! Time flip and reflection bring every goal to x ≥ 0 and y ≥ 0. There only 20 words and
+//! C|C|C are ever the shortest, 12 or 13 of them for either sign of the heading. Which, was
+//! counted over random goals, not derived; the tests compare the result with all words. For
+//! a partition that needs 20 words see doi 10.1109/TRO.2025.3554406.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
