@@ -367,16 +367,20 @@ impl HybridAStar {
     /// that a curve from the start reaches as well is preferred, so that two curves are the
     /// whole plan: the one of least cost, and of equals the one where the parking manoeuvre
     /// begins (the first change of gear, or, without any, the last turn).
+    ///
+    /// The curve to the goal is free in `cell`; its goal is that of `problem`, whose free space may
+    /// be larger.
     pub fn preparatory_tail(
         &mut self,
         problem: &Problem,
+        cell: &Problem,
         path: &Path,
         snap: impl Fn(Pose) -> Pose,
     ) -> Option<AnalyticTail> {
         const SPACING: f64 = 0.5;
         /// Cheaper by less than this counts as equal.
         const EQUAL: f64 = 0.05;
-        let goal = self.goal_set(problem);
+        let goal = self.goal_set(cell);
         let (approach, manoeuvre) = path.split_at(manoeuvre_begin(path));
         let later = manoeuvre.sample(SPACING).into_iter();
         let earlier = approach.sample(SPACING).into_iter().rev();
@@ -384,10 +388,10 @@ impl HybridAStar {
         let mut two_curves: Option<(f64, AnalyticTail)> = None;
         for sample in later.chain(earlier) {
             let pose = snap(sample.pose);
-            if !problem.collision.pose_is_free(pose) {
+            if !cell.collision.pose_is_free(pose) {
                 continue;
             }
-            let Some(tail) = self.connect(problem, pose, &goal).map(|c| c.tail()) else { continue };
+            let Some(tail) = self.connect(cell, pose, &goal).map(|c| c.tail()) else { continue };
             one_curve = one_curve.or(Some(tail));
             let Some(leg) = self.direct(problem, path.start, &GoalSet::single(pose)) else {
                 continue;

@@ -93,9 +93,10 @@ fn for_each_problem(
     let Metadata { vehicle, grid, .. } = metadata;
     let footprint = vehicle.footprint(Problem::MARGIN);
     let goal = grid.goal(kind, vehicle);
+    let grid = grid.with_lane_behind(metadata.start_behind);
     for of_cell in samples.chunk_by(|a, b| a.cell_index == b.cell_index) {
         // The goal stands in as start.
-        let Ok(mut problem) = Problem::in_cell(grid, &of_cell[0].cell, *vehicle, goal) else {
+        let Ok(mut problem) = Problem::in_cell(&grid, &of_cell[0].cell, *vehicle, goal) else {
             continue;
         };
         if *problem.collision.footprint() != footprint {
