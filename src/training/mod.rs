@@ -9,8 +9,9 @@ pub mod knn;
 pub mod mlp;
 mod mlp_config;
 pub mod optimiser;
+mod targets;
 
-pub use mlp_config::{Loss, MlpConfig, Schedule};
+pub use mlp_config::{Loss, MlpConfig, Schedule, Targets};
 
 use crate::dataset::{Sample, Status};
 use crate::files::TomlError;
