@@ -8,6 +8,7 @@
 //! The same samples, settings and seed give the same bytes: initial weights, order of rows
 //! and validation cells come from [`crate::rng`].
 
+use std::collections::BTreeSet;
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
 
@@ -19,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use super::curve::{self, EpochLoss};
 use super::optimiser::AdamW;
 use super::targets::{self, Example};
-use super::{Loss, MlpConfig, TrainingError, solved};
+use super::{Loss, MlpConfig, TrainingError, Validation, solved};
 use crate::dataset::{Metadata, Sample, validation_cells};
 use crate::geometry::{Pose, signed_angle};
 use crate::progress;
@@ -188,13 +189,13 @@ fn features(example: &Example) -> [f32; Features::COUNT] {
     Features::new(example.start, example.cell).values()
 }
 
-/// Training and validation rows: whole cells validate, at least one. Where there is one
-/// cell only, single rows of it do.
+/// Training and validation rows. Sample indices validate, the same in every cell, or whole
+/// cells; at least one, and where there is one cell only, single rows of it do.
 fn split(all: Vec<Example>, config: &MlpConfig) -> (Vec<Example>, Vec<Example>) {
     let one_cell = all[0].cell_index == all[all.len() - 1].cell_index;
-    let unit = |e: &Example| if one_cell { e.sample_index } else { e.cell_index };
-    let mut units: Vec<u32> = all.iter().map(unit).collect();
-    units.dedup();
+    let starts = one_cell || config.validation == Validation::Starts;
+    let unit = |e: &Example| if starts { e.sample_index } else { e.cell_index };
+    let units: BTreeSet<u32> = all.iter().map(unit).collect();
     let share = config.validation_share.max(1.0 / units.len() as f64);
     let kept = validation_cells(units, share, config.seed);
     all.into_iter().partition(|e| !kept.contains(&unit(e)))

@@ -38,6 +38,16 @@ pub enum Targets {
     PerCell,
 }
 
+/// What is kept from training to validate with.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Validation {
+    /// Some starts in every cell: what planning asks, for its cells are those of the grid.
+    Starts,
+    /// Whole cells: how well the network carries over to environments never seen.
+    Cells,
+}
+
 /// Settings of the training. The network itself is the paper's and fixed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -63,7 +73,9 @@ pub struct MlpConfig {
     /// With one target per cell: every other row starts behind the cell's lane, up to this
     /// far, metres; 0 for none.
     pub behind: f64,
-    /// Share of the cells kept for validation.
+    /// What is kept for validation.
+    pub validation: Validation,
+    /// Share of the starts or cells kept for validation.
     pub validation_share: f64,
     /// Seed of initial weights, shuffling and validation cells.
     pub seed: u64,
@@ -82,6 +94,7 @@ impl Default for MlpConfig {
             patience: 20,
             targets: Targets::PerCell,
             behind: 8.0,
+            validation: Validation::Starts,
             validation_share: 0.1,
             seed: 1,
         }

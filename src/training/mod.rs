@@ -11,7 +11,7 @@ mod mlp_config;
 pub mod optimiser;
 mod targets;
 
-pub use mlp_config::{Loss, MlpConfig, Schedule, Targets};
+pub use mlp_config::{Loss, MlpConfig, Schedule, Targets, Validation};
 
 use crate::dataset::{Sample, Status};
 use crate::files::TomlError;

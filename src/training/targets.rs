@@ -57,12 +57,12 @@ const LOST: f64 = 100.0;
 /// Errors of the network that a pose is judged with: along, across, turned.
 const ERRORS: [(f64, f64, f64); 7] = [
     (0.0, 0.0, 0.0),
-    (0.05, 0.0, 0.0),
-    (-0.05, 0.0, 0.0),
-    (0.0, 0.05, 0.0),
-    (0.0, -0.05, 0.0),
-    (0.0, 0.0, 0.02),
-    (0.0, 0.0, -0.02),
+    (0.03, 0.0, 0.0),
+    (-0.03, 0.0, 0.0),
+    (0.0, 0.03, 0.0),
+    (0.0, -0.03, 0.0),
+    (0.0, 0.0, 0.01),
+    (0.0, 0.0, -0.01),
 ];
 /// Draws before a start counts as impossible.
 const MAX_DRAWS: usize = 200;
