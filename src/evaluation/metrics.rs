@@ -86,6 +86,55 @@ pub struct Group {
     pub summaries: Vec<Summary>,
 }
 
+/// One method over all scenes of a run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Totals {
+    /// Name of the method.
+    pub method: String,
+    /// Scenes it applies to.
+    pub scenes: usize,
+    /// Those with an accepted path.
+    pub solved: usize,
+    /// Those whose path the independent check refused.
+    pub rejected: usize,
+    /// Those that a guided planner had to search the whole way.
+    pub fallbacks: usize,
+    /// Scenes it does not apply to.
+    pub not_applicable: usize,
+    /// Median time where it applies, seconds; zero if nowhere.
+    pub median_t_s: f64,
+}
+
+/// The totals of every method, in the order of their first rows.
+pub fn totals(rows: &[Row]) -> Vec<Totals> {
+    let mut all: Vec<(Totals, Vec<f64>)> = Vec::new();
+    let mut places: HashMap<&str, usize> = HashMap::new();
+    for row in rows {
+        let place = *places.entry(&row.method).or_insert_with(|| {
+            all.push((Totals { method: row.method.clone(), ..Totals::default() }, Vec::new()));
+            all.len() - 1
+        });
+        let (t, times) = &mut all[place];
+        if !row.applies() {
+            t.not_applicable += 1;
+            continue;
+        }
+        times.push(row.plan_time_s);
+        t.scenes += 1;
+        t.solved += usize::from(row.ok);
+        t.rejected += usize::from(row.is_rejected());
+        t.fallbacks += usize::from(row.fallback);
+    }
+    let finish = |(mut t, mut times): (Totals, Vec<f64>)| {
+        times.sort_by(f64::total_cmp);
+        if !times.is_empty() {
+            t.median_t_s = percentile(&times, 0.5);
+        }
+        t
+    };
+    all.into_iter().map(finish).collect()
+}
+
 /// Summarises the `rows` whose method applies to their scene by level (hardest last) and
 /// type. `seed` drives the resampling.
 pub fn summarise(rows: &[Row], seed: u64) -> Vec<Group> {
@@ -208,7 +257,7 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 /// The `q` quantile of sorted values, linear between ranks.
-fn percentile(sorted: &[f64], q: f64) -> f64 {
+pub(super) fn percentile(sorted: &[f64], q: f64) -> f64 {
     let at = q * (sorted.len() - 1) as f64;
     let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
     low + (high - low) * at.fract()
