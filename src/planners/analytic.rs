@@ -315,11 +315,7 @@ impl<'a> Curves<'a> {
     fn bound(&self, to: Pose) -> f64 {
         /// Metres that rounding may cost a word.
         const ROUNDING: f64 = 1e-6;
-        #[cfg(feature = "rsb")]
-        let length = reeds_shepp::shortest_length(self.from, to, self.radius);
-        #[cfg(not(feature = "rsb"))]
-        let length = self.from.distance(to);
-        (length - ROUNDING) * self.model.forward.min(self.model.backward)
+        (self.from.distance(to) - ROUNDING) * self.model.forward.min(self.model.backward)
     }
 }
 
@@ -363,4 +359,66 @@ pub(super) fn least_curve_cost(
         curve_cost(w, DriveState { gear: None, steer }, vehicle, model).0
     });
     costs.fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planners::{HybridAStar, HybridAStarConfig};
+    use crate::rng::{Stream, rng};
+    use crate::world::generate::{GeneratorConfig, generate};
+    use crate::world::{Level, ParkingType};
+    use rand::RngExt;
+
+    /// Every word to every entry, sorted by cost: the first free one.
+    fn exhaustive(
+        from: Pose,
+        goal: &GoalSet,
+        problem: &Problem,
+        model: &CostModel,
+    ) -> Option<(f64, usize, Word)> {
+        let vehicle = &problem.vehicle;
+        let mut all = Vec::new();
+        for (i, entry) in goal.entries().iter().enumerate() {
+            let mut words = Vec::new();
+            reeds_shepp::words(from, entry.pose, vehicle.turning_radius(), &mut words);
+            for word in words {
+                let (cost, arrival) = curve_cost(&word, DriveState::PARKED, vehicle, model);
+                all.push((cost + model.change(arrival, entry.departure) + entry.cost, i, word));
+            }
+        }
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let is_free = |word: &Word| problem.collision.segments_are_free(from, word.segments());
+        all.into_iter().find(|(_, _, word)| is_free(word))
+    }
+
+    #[test]
+    fn best_first_finds_what_trying_all_finds() {
+        let (config, vehicle) = (GeneratorConfig::default(), crate::vehicle::Vehicle::default());
+        let model = CostModel::default();
+        let mut expansion = AnalyticExpansion::default();
+        let mut rng = rng(4, Stream::Start, 0);
+        let (mut found, mut none) = (0, 0);
+        for index in 0..40 {
+            for (kind, level) in ParkingType::ALL.into_iter().zip(Level::ALL) {
+                let scene = generate(&config, &vehicle, kind, level, 77, index);
+                let problem = Problem::new(&scene).unwrap();
+                let mut goal = HybridAStar::new(HybridAStarConfig::default()).goal_set(&problem);
+                // The same entry twice: of equal costs the first is taken.
+                for entry in goal.entries.clone() {
+                    goal.entries.insert(rng.random_range(0..=goal.entries.len()), entry);
+                }
+                for _ in 0..20 {
+                    let mut r = |a: f64| rng.random_range(-a..a);
+                    let (s, reach) = (problem.start, 2.0);
+                    let from = Pose::new(s.x + r(reach), s.y + r(reach), s.heading + r(1.0));
+                    let expected = exhaustive(from, &goal, &problem, &model);
+                    let got = expansion.connect(from, &goal, &problem, &model);
+                    assert_eq!(got.map(|c| (c.cost, c.entry_index, c.word)), expected);
+                    *(if expected.is_some() { &mut found } else { &mut none }) += 1;
+                }
+            }
+        }
+        assert!(found > 100 && none > 100, "{found} {none}");
+    }
 }

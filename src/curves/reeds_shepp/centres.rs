@@ -7,8 +7,10 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use super::ZERO;
 use crate::geometry::{Pose, wrap_angle};
+
+/// Centres closer than this are the same: the vector between them is rounding.
+const SAME: f64 = 1e-12;
 
 /// The goal seen from the start, in turning radii, with its sine and cosine.
 #[derive(Clone, Copy)]
@@ -27,6 +29,13 @@ impl UnitGoal {
         let phi = wrap_angle(to.heading - from.heading);
         let (sin, cos) = phi.sin_cos();
         Self { x: c * dx + s * dy, y: c * dy - s * dx, phi, sin, cos }
+    }
+
+    /// The goal that has the same words but for swapped gears or sides, with x, y ≥ 0.
+    pub fn in_first_quadrant(self) -> Self {
+        let sign = if (self.x < 0.0) == (self.y < 0.0) { 1.0 } else { -1.0 };
+        let (phi, sin) = (sign * self.phi, sign * self.sin);
+        Self { x: self.x.abs(), y: self.y.abs(), phi, sin, ..self }
     }
 
     /// From the start's left centre to the goal's left centre.
@@ -71,7 +80,7 @@ impl Link {
 
     /// Its direction θ; zero when the circles are the same and every direction serves.
     pub fn angle(self) -> f64 {
-        if self.sq > ZERO * ZERO { self.y.atan2(self.x) } else { 0.0 }
+        if self.sq > SAME * SAME { self.y.atan2(self.x) } else { 0.0 }
     }
 
     /// The inner tangent of the circles: its length √(ρ² − 4), and its angle to the link.
@@ -102,7 +111,7 @@ impl Same {
 
     /// Every gear swapped.
     pub fn time_flipped(self) -> Self {
-        let theta = if self.rho > ZERO { flip(self.theta) } else { 0.0 };
+        let theta = if self.rho > SAME { flip(self.theta) } else { 0.0 };
         Self { theta, ..self }
     }
 

@@ -9,9 +9,11 @@
 //! Inside this module lengths are in turning radii and the goal is seen from the start.
 
 mod centres;
+mod shortest;
 mod words;
 
 use self::centres::UnitGoal;
+use self::shortest::shortest;
 use self::words::{Sink, Turn, enumerate};
 use super::Segment;
 use crate::geometry::Pose;
@@ -86,21 +88,14 @@ impl Sink for Collect<'_> {
 
 /// Length of the shortest word from `from` to `to`, metres.
 pub fn shortest_length(from: Pose, to: Pose, radius: f64) -> f64 {
-    struct Least(f64);
-    impl Sink for Least {
-        #[inline]
-        fn word<const N: usize>(&mut self, _: [Turn; N], lengths: [f64; N]) {
-            self.0 = self.0.min(lengths.iter().map(|l| l.abs()).sum());
-        }
-    }
-    let mut least = Least(f64::INFINITY);
-    enumerate(UnitGoal::new(from, to, radius), &mut least);
-    if least.0.is_finite() { least.0 * radius } else { 0.0 }
+    let length = shortest(UnitGoal::new(from, to, radius));
+    // Only coinciding poses may have no word.
+    if length.is_finite() { length * radius } else { 0.0 }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::PI;
+    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
     use super::*;
     use crate::curves::Path;
@@ -139,6 +134,51 @@ mod tests {
             assert!(shortest >= from.distance(to) - 1e-9);
         }
         assert_eq!(names.len(), 48, "{names:?}");
+    }
+
+    /// Poses around the origin, most of them on or near the borders where one word takes over
+    /// from another.
+    fn delicate_pose(rng: &mut impl rand::Rng, i: usize) -> Pose {
+        let mut r = |a: f64| rng.random_range(-a..a);
+        let reach = [0.3, 2.0, 5.0, 100.0][i % 4];
+        let tiny = [0; 3].map(|_| r(1.0).signum() * 10.0_f64.powf(r(6.0) - 6.0));
+        let eighth = r(4.0).round() * FRAC_PI_4;
+        match i / 4 % 6 {
+            0 => Pose::new(r(reach), r(reach), r(PI)),
+            1 => Pose::new(tiny[0], tiny[1], tiny[2]),
+            2 => Pose::new((2.0 * r(reach)).round() / 2.0, (2.0 * r(reach)).round() / 2.0, eighth),
+            3 => Pose::new(r(reach), tiny[0], eighth + tiny[1]),
+            4 => Pose::new(r(1.0).round() * reach, r(1.0).round() * reach, r(1.5).round() * PI),
+            // Where words of few segments end.
+            _ => (0..1 + i % 4).fold(Pose::default(), |pose, _| {
+                let length = if i.is_multiple_of(5) { r(4.0).round() * FRAC_PI_4 } else { r(3.0) };
+                Segment { curvature: r(1.5).round(), length }.end(pose)
+            }),
+        }
+    }
+
+    #[test]
+    fn the_shortest_length_is_that_of_the_shortest_word() {
+        let mut rng = rng(3, Stream::Start, 0);
+        let mut out = Vec::new();
+        let mut check = |to: Pose| {
+            out.clear();
+            words(Pose::default(), to, 1.0, &mut out);
+            let best = out.iter().map(Word::length).fold(f64::INFINITY, f64::min);
+            let shortest = shortest_length(Pose::default(), to, 1.0);
+            // Words leave out segments of up to ZERO.
+            assert!((best - shortest).abs() < 1e-9 * best + 4.0 * ZERO, "{to:?} {best} {shortest}");
+        };
+        for i in 0..2_000_000 {
+            check(delicate_pose(&mut rng, i));
+        }
+        for heading in [0.0, -0.0, PI, -PI, FRAC_PI_2, -FRAC_PI_2] {
+            for x in [0.0, -0.0, 1.0, -1.0, 2.0, -4.0] {
+                for y in [0.0, -0.0, 1.0, -1.0, 2.0, -4.0] {
+                    check(Pose::new(x, y, heading));
+                }
+            }
+        }
     }
 
     #[test]

@@ -101,15 +101,18 @@ impl Class {
     }
 }
 
+/// The lengths t, u and v of a formula, signed.
+pub(super) type Triple = (f64, f64, f64);
+
 /// L⁺S⁺L⁺, eq. 8.1.
-fn lsl(c: &Same, phi: f64) -> Option<(f64, f64, f64)> {
+pub(super) fn lsl(c: &Same, phi: f64) -> Option<Triple> {
     let t = c.theta;
     let v = wrap(phi - t);
     (t >= -ZERO && v >= -ZERO).then_some((t, c.rho, v))
 }
 
 /// L⁺S⁺R⁺, eq. 8.2.
-fn lsr(c: &Opposite, phi: f64) -> Option<(f64, f64, f64)> {
+pub(super) fn lsr(c: &Opposite, phi: f64) -> Option<Triple> {
     let (u, beyond) = c.crossing?;
     let t = wrap(c.theta + beyond);
     let v = wrap(t - phi);
@@ -118,7 +121,7 @@ fn lsr(c: &Opposite, phi: f64) -> Option<(f64, f64, f64)> {
 
 /// L⁺R⁻L^±, eqs. 8.3 and 8.4 (with the misprint of 8.4 corrected: the sign of v tells
 /// which of the two it is).
-fn lrl(c: &Same, phi: f64) -> Option<(f64, f64, f64)> {
+pub(super) fn lrl(c: &Same, phi: f64) -> Option<Triple> {
     let half = c.half_middle?;
     let u = -2.0 * half;
     let t = wrap(c.theta - half + PI);
@@ -127,7 +130,7 @@ fn lrl(c: &Same, phi: f64) -> Option<(f64, f64, f64)> {
 }
 
 /// L⁺R⁺ᵤL⁻ᵤR⁻, eq. 8.7; its τ is θ + π/2 + u.
-fn lr_u_lr(c: &Opposite, phi: f64) -> Option<(f64, f64, f64)> {
+pub(super) fn lr_u_lr(c: &Opposite, phi: f64) -> Option<Triple> {
     let u = c.outward?;
     let t = wrap(c.theta + FRAC_PI_2 + u);
     let v = wrap(t - 2.0 * u - phi);
@@ -135,7 +138,7 @@ fn lr_u_lr(c: &Opposite, phi: f64) -> Option<(f64, f64, f64)> {
 }
 
 /// L⁺R⁻ᵤL⁻ᵤR⁺, eq. 8.8.
-fn l_ru_lu_r(c: &Opposite, phi: f64) -> Option<(f64, f64, f64)> {
+pub(super) fn l_ru_lu_r(c: &Opposite, phi: f64) -> Option<Triple> {
     let (u, beyond) = c.inward?;
     let t = wrap(c.theta + beyond);
     let v = wrap(t - phi);
@@ -143,7 +146,7 @@ fn l_ru_lu_r(c: &Opposite, phi: f64) -> Option<(f64, f64, f64)> {
 }
 
 /// L⁺R⁻(π/2)S⁻L⁻, eq. 8.9.
-fn l_r_sl(c: &Same, phi: f64) -> Option<(f64, f64, f64)> {
+pub(super) fn l_r_sl(c: &Same, phi: f64) -> Option<Triple> {
     let (r, beyond) = c.crossing?;
     let u = 2.0 - r;
     let t = wrap(c.theta + FRAC_PI_2 + beyond);
@@ -152,7 +155,7 @@ fn l_r_sl(c: &Same, phi: f64) -> Option<(f64, f64, f64)> {
 }
 
 /// L⁺R⁻(π/2)S⁻R⁻, eq. 8.10.
-fn l_r_sr(c: &Opposite, phi: f64) -> Option<(f64, f64, f64)> {
+pub(super) fn l_r_sr(c: &Opposite, phi: f64) -> Option<Triple> {
     let u = 2.0 - c.rho;
     if u > 0.0 {
         return None;
@@ -163,7 +166,7 @@ fn l_r_sr(c: &Opposite, phi: f64) -> Option<(f64, f64, f64)> {
 }
 
 /// L⁺R⁻(π/2)S⁻L⁻(π/2)R⁺, eq. 8.11; its t is θ + π/2 and the angle of the crossing.
-fn l_r_sl_r(c: &Opposite, phi: f64) -> Option<(f64, f64, f64)> {
+pub(super) fn l_r_sl_r(c: &Opposite, phi: f64) -> Option<Triple> {
     let (r, beyond) = c.crossing?;
     let u = 4.0 - r;
     let t = wrap(c.theta + FRAC_PI_2 + beyond);
