@@ -87,7 +87,7 @@ pub struct Group {
 }
 
 /// One method over all scenes of a run.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Totals {
     /// Name of the method.
     pub method: String,
@@ -101,38 +101,48 @@ pub struct Totals {
     pub fallbacks: usize,
     /// Scenes it does not apply to.
     pub not_applicable: usize,
-    /// Median time where it applies, seconds; zero if nowhere.
-    pub median_t_s: f64,
+    /// Median time, seconds; `None` where it applies nowhere.
+    pub median_t_s: Option<f64>,
+    /// Mean length of the solved paths, metres.
+    pub mean_length_m: Option<f64>,
+    /// Their mean number of direction changes.
+    pub mean_direction_changes: Option<f64>,
+    /// Mean expansions.
+    pub mean_nodes: Option<f64>,
 }
 
 /// The totals of every method, in the order of their first rows.
 pub fn totals(rows: &[Row]) -> Vec<Totals> {
-    let mut all: Vec<(Totals, Vec<f64>)> = Vec::new();
+    let mut methods: Vec<(&str, Vec<&Row>)> = Vec::new();
     let mut places: HashMap<&str, usize> = HashMap::new();
     for row in rows {
-        let place = *places.entry(&row.method).or_insert_with(|| {
-            all.push((Totals { method: row.method.clone(), ..Totals::default() }, Vec::new()));
-            all.len() - 1
-        });
-        let (t, times) = &mut all[place];
-        if !row.applies() {
-            t.not_applicable += 1;
-            continue;
+        let place = *places.entry(&row.method).or_insert(methods.len());
+        if place == methods.len() {
+            methods.push((&row.method, Vec::new()));
         }
-        times.push(row.plan_time_s);
-        t.scenes += 1;
-        t.solved += usize::from(row.ok);
-        t.rejected += usize::from(row.is_rejected());
-        t.fallbacks += usize::from(row.fallback);
+        methods[place].1.push(row);
     }
-    let finish = |(mut t, mut times): (Totals, Vec<f64>)| {
-        times.sort_by(f64::total_cmp);
-        if !times.is_empty() {
-            t.median_t_s = percentile(&times, 0.5);
-        }
-        t
-    };
-    all.into_iter().map(finish).collect()
+    methods.into_iter().map(|(method, rows)| total(method, &rows)).collect()
+}
+
+fn total(method: &str, all: &[&Row]) -> Totals {
+    let rows: Vec<&Row> = all.iter().copied().filter(|r| r.applies()).collect();
+    let count = |is: fn(&Row) -> bool| rows.iter().filter(|r| is(r)).count();
+    let solved = || rows.iter().filter(|r| r.ok);
+    let mut times: Vec<f64> = rows.iter().map(|r| r.plan_time_s).collect();
+    times.sort_by(f64::total_cmp);
+    Totals {
+        method: method.to_owned(),
+        scenes: rows.len(),
+        solved: count(|r| r.ok),
+        rejected: count(Row::is_rejected),
+        fallbacks: count(|r| r.fallback),
+        not_applicable: all.len() - rows.len(),
+        median_t_s: (!times.is_empty()).then(|| percentile(&times, 0.5)),
+        mean_length_m: mean(solved().filter_map(|r| r.length_m)),
+        mean_direction_changes: mean(solved().filter_map(|r| r.direction_changes).map(f64::from)),
+        mean_nodes: mean(rows.iter().map(|r| f64::from(r.nodes))),
+    }
 }
 
 /// Summarises the `rows` whose method applies to their scene by level (hardest last) and

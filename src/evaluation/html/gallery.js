@@ -155,10 +155,9 @@
   let shown = null; // { scene, run, vehicle, way, car, layers }
 
   const scene = () => data.scenes[state.scene];
-  const reduced = (value, digits) => (value === null ? "–" : value.toFixed(digits));
   const figures = (v) => (v >= 100 ? v.toFixed(0) : v.toPrecision(3));
   const time = (s) => (s < 1e-3 ? `${figures(s * 1e6)} µs` : s < 1 ? `${figures(s * 1e3)} ms` : `${figures(s)} s`);
-  const verdict = (run) => (!run.applies ? "not applicable" : run.ok ? run.route || "path" : `✕ ${run.why}`);
+  const verdict = (run) => (!run.applies ? "not applicable" : run.ok ? run.route || "–" : `✕ ${run.why}`);
 
   function draw() {
     const s = scene();
@@ -230,7 +229,7 @@
     const name = run ? data.methods[run.method] : "no method";
     at("map-title").textContent = `${s.name}, ${name}`;
     at("map-text").textContent = way
-      ? `${way.driven.toFixed(1)} m, ${run.changes} direction changes, ${verdict(run)}`
+      ? `${way.driven.toFixed(1)} m, ${run.changes} direction changes${run.ok ? "" : `, ${verdict(run)}`}`
       : `No path: ${run ? verdict(run) : "no rows"}`;
     const problem = !run?.ok;
     at("verdict").hidden = !problem;
@@ -265,8 +264,8 @@
     car.classList.toggle("reversing", Boolean(leg) && moving && leg.length < 0);
     car.classList.toggle("advancing", Boolean(leg) && moving && leg.length > 0);
     at("gear").textContent = leg ? gearOf(leg) : "";
-    at("speedometer").textContent = leg ? `${(leg.driven + Math.abs(leg.length) * share).toFixed(1)} m` : "";
-    at("steering").textContent = leg ? `steer ${((steer * 180) / Math.PI).toFixed(1)}°` : "";
+    at("driven").textContent = leg ? `${(leg.driven + Math.abs(leg.length) * share).toFixed(1)} m` : "";
+    at("steering").textContent = leg ? `steer ${((steer * 180) / Math.PI).toFixed(1)}°`.replace("-", "−") : "";
     at("time").value = state.time;
     at("time").setAttribute("aria-valuetext", leg ? `${state.time.toFixed(1)} seconds, ${gearOf(leg)}` : "no path");
     at("clock").textContent = way ? `${state.time.toFixed(1)} / ${way.time.toFixed(1)} s` : "–";
@@ -325,16 +324,13 @@
       label.append(radio, data.methods[run.method]);
       head.append(label);
       tr.append(head);
-      const path = run.length !== null;
-      for (const text of [
-        run.applies ? time(run.time) : "–",
-        run.applies ? run.nodes : "–",
-        path ? `${reduced(run.length, 1)} m` : "–",
-        run.changes ?? "–",
-        path ? reduced(run.clearance, 3) : "–",
-        verdict(run),
-      ]) tr.insertCell().textContent = text;
-      tr.lastChild.classList.toggle("bad", run.applies && !run.ok);
+      const cell = (text, span = 1) => Object.assign(tr.insertCell(), { textContent: text, colSpan: span });
+      if (run.applies) [time(run.time), run.nodes].forEach((text) => cell(text));
+      if (run.length !== null) {
+        [run.length.toFixed(1), run.changes, run.clearance?.toFixed(3) ?? "–"].forEach((text) => cell(text));
+      }
+      const remark = cell(verdict(run), run.length !== null ? 1 : run.applies ? 4 : 6);
+      remark.className = run.ok ? "text" : run.applies ? "text bad" : "text soft";
       tr.addEventListener("click", () => choose(state.scene, run.method));
       radio.addEventListener("change", () => choose(state.scene, run.method));
       return tr;
@@ -372,11 +368,12 @@
     showView();
   }
 
-  /** Follows `#play-SCENE-METHOD`. */
+  /** Follows `#play-SCENE-METHOD` or `#play-SCENE-METHOD-SECONDS`. */
   function follow() {
-    const [, s, m] = /^#play-(\d+)-(\d+)$/.exec(location.hash) ?? [];
+    const [, s, m, t] = /^#play-(\d+)-(\d+)(?:-([\d.]+))?$/.exec(location.hash) ?? [];
     if (s === undefined || !data.scenes[s] || !data.methods[m]) return false;
     choose(Number(s), Number(m));
+    seek(Number(t ?? 0));
     return true;
   }
 
@@ -419,15 +416,17 @@
   if (data.scenes.length) {
     document.querySelector(".viewer").hidden = false;
     listen();
-    // At first the last method of the rows, our own where it takes part.
-    const first = data.methods.indexOf("n3p");
-    if (!follow()) {
-      Object.assign(state, { method: first >= 0 ? first : data.methods.length - 1 });
+    if (follow()) {
+      at("gallery").scrollIntoView();
+    } else {
+      // At first a scene of the last, hardest setting, and our own method if it takes part.
+      const last = data.scenes.at(-1);
+      state.scene = data.scenes.findIndex((s) => s.type === last.type && s.level === last.level);
+      const ours = data.methods.indexOf("n3p");
+      state.method = ours >= 0 ? ours : data.methods.length - 1;
       fillLists();
       fillRuns();
       draw();
-    } else {
-      at("gallery").scrollIntoView();
     }
   }
   document.documentElement.dataset.ready = data.scenes.length;

@@ -19,7 +19,6 @@ use super::method::Method;
 use super::metrics;
 use super::report::{NOTES, Provenance};
 use super::rows::Row;
-use super::table::figures;
 use super::trace::Trace;
 use gallery::Gallery;
 
@@ -29,7 +28,7 @@ struct Page<'a> {
     title: &'a str,
     command: &'a str,
     facts: Vec<(&'static str, String)>,
-    methods: Vec<MethodLine<'a>>,
+    methods: Vec<tables::MethodLine>,
     scenes: usize,
     settings: usize,
     episodes: usize,
@@ -51,14 +50,6 @@ struct Page<'a> {
     scripts: Vec<&'static str>,
 }
 
-/// A method over all scenes.
-#[derive(Serialize)]
-struct MethodLine<'a> {
-    family: &'static str,
-    median: String,
-    totals: &'a metrics::Totals,
-}
-
 /// The page of a run. `shown` are the [`gallery::chosen`] cases, `traces` theirs.
 pub fn page(
     title: &str,
@@ -76,16 +67,11 @@ pub fn page(
     let scene_index: HashMap<&str, usize> =
         gallery.scenes.iter().enumerate().map(|(i, s)| (s.name.as_str(), i)).collect();
     let failures = tables::failures(rows, &scene_index, &gallery.methods);
-    let totals = totals.iter().map(|t| MethodLine {
-        family: family(&t.method),
-        median: time(t.median_t_s),
-        totals: t,
-    });
     let view = Page {
         title,
         command: &provenance.command,
         facts: provenance.facts().to_vec(),
-        methods: totals.collect(),
+        methods: tables::methods(&totals),
         scenes: rows.iter().map(|r| &r.scene).collect::<HashSet<_>>().len(),
         settings: groups.len(),
         episodes: rows.iter().filter(|r| r.applies()).count(),
@@ -121,24 +107,6 @@ fn family(method: &str) -> &'static str {
         Ok(Method::RlSimple | Method::RlEval) => "rl",
         Ok(method) if method.is_graph_search() => "search",
         _ => "other",
-    }
-}
-
-/// Seconds for people.
-fn time(seconds: f64) -> String {
-    match seconds {
-        s if s < 1e-3 => format!("{} µs", short(s * 1e6)),
-        s if s < 1.0 => format!("{} ms", short(s * 1e3)),
-        s => format!("{} s", short(s)),
-    }
-}
-
-/// Three figures or so.
-fn short(v: f64) -> String {
-    if v >= 100.0 {
-        format!("{v:.0}")
-    } else {
-        figures(v).get(..4).unwrap_or("0").trim_end_matches('.').to_owned()
     }
 }
 

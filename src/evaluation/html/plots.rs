@@ -17,7 +17,7 @@ pub const DOTS: usize = 150;
 /// Sizes, in the panel's own units (about a pixel).
 const WIDTH: f64 = 400.0;
 const LEFT: f64 = 66.0;
-const RIGHT: f64 = 12.0;
+const RIGHT: f64 = 16.0;
 const TOP: f64 = 8.0;
 const LINE: f64 = 27.0;
 const BOTTOM: f64 = 34.0;
@@ -112,7 +112,7 @@ pub fn speed_ups(groups: &[Group], methods: &[&str]) -> Plot {
         })
     };
     let axis = Axis {
-        title: "times faster than the fastest graph search",
+        title: "times as fast as the fastest graph search",
         low: 0,
         high: 0,
         zero: false,
@@ -276,15 +276,17 @@ impl Plot {
                 let _ = write!(svg, "<path class=\"mean ref\" d=\"{d}\"/>");
             }
             Mark::Ratio { ratio, low, high, paper } => {
-                let d = format!("M{} {y}H{}", x(*low), x(*high));
-                let caps = [low, high].map(|v| format!("M{} {}v8", x(*v), y - 4.0)).concat();
+                // Ours above, the paper's below: neither hides the other.
+                let (ours, theirs) = (y - 4.0, y + 5.0);
+                let d = format!("M{} {ours}H{}", x(*low), x(*high));
+                let caps = [low, high].map(|v| format!("M{} {}v8", x(*v), ours - 4.0)).concat();
                 let _ = write!(svg, "<path class=\"ci\" d=\"{d}{caps}\"/>");
                 if let Some(paper) = paper {
-                    let d = format!("M{} {}l4.5 8h-9z", x(*paper), y - 5.0);
+                    let d = format!("M{} {}l4.5 8h-9z", x(*paper), theirs - 4.0);
                     let _ = write!(svg, "<path class=\"paper-mark\" d=\"{d}\"/>");
                 }
-                let _ =
-                    write!(svg, "<circle class=\"mean\" cx=\"{}\" cy=\"{y}\" r=\"4\"/>", x(*ratio));
+                let cx = x(*ratio);
+                let _ = write!(svg, "<circle class=\"mean\" cx=\"{cx}\" cy=\"{ours}\" r=\"4\"/>");
             }
             Mark::Values { solved, failed } => {
                 // Neighbours by rank are spread by the golden ratio, within ± 7.
@@ -384,7 +386,7 @@ fn count(decade: i32) -> String {
 }
 
 fn times_faster(decade: i32) -> String {
-    format!("{} ×", 10f64.powi(decade))
+    10f64.powi(decade).to_string()
 }
 
 /// A coordinate to a tenth.

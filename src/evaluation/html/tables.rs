@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use serde::Serialize;
 
 use super::super::method::Method;
-use super::super::metrics::{Group, Interval, Summary};
+use super::super::metrics::{Group, Interval, Summary, Totals};
 use super::super::rows::Row;
 use super::super::table::{self, PaperRow, figures, kind_name, level_title, numbers};
 use super::family;
@@ -26,6 +26,61 @@ pub const COLUMNS: [Column; 10] = [
     ("max N_dc", "", "largest number of direction changes"),
     ("N_node", "", "mean number of node expansions"),
 ];
+
+/// A method over all scenes.
+#[derive(Serialize)]
+pub struct MethodLine {
+    pub family: &'static str,
+    pub kind: &'static str,
+    pub totals: Totals,
+    pub median: String,
+    pub length: String,
+    pub changes: String,
+    pub nodes: String,
+    pub remarks: String,
+}
+
+/// One line per method.
+pub fn methods(totals: &[Totals]) -> Vec<MethodLine> {
+    let line = |t: &Totals| {
+        let counts = [
+            (t.rejected, "refused by the independent check"),
+            (t.fallbacks, "by full search"),
+            (t.not_applicable, "not applicable"),
+        ];
+        let remarks = counts.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}"));
+        let dash = || "–".to_owned();
+        let family = family(&t.method);
+        MethodLine {
+            family,
+            kind: match family {
+                "search" => "graph search",
+                "n3p" => "the paper’s N3P",
+                "ours" => "N3P, ours",
+                "rl" => "reinforcement learning",
+                _ => "other",
+            },
+            median: t.median_t_s.map_or_else(dash, seconds),
+            length: t.mean_length_m.map_or_else(dash, |v| format!("{v:.2} m")),
+            changes: t.mean_direction_changes.map_or_else(dash, |v| format!("{v:.2}")),
+            nodes: t.mean_nodes.map_or_else(dash, |v| format!("{v:.1}")),
+            remarks: remarks.collect::<Vec<_>>().join(", "),
+            totals: t.clone(),
+        }
+    };
+    totals.iter().map(line).collect()
+}
+
+/// Seconds for people.
+fn seconds(s: f64) -> String {
+    let (value, unit) = match s {
+        s if s < 1e-3 => (s * 1e6, "µs"),
+        s if s < 1.0 => (s * 1e3, "ms"),
+        s => (s, "s"),
+    };
+    let digits = if value >= 100.0 { 0 } else { 1 };
+    format!("{value:.digits$} {unit}")
+}
 
 /// The table of one level.
 #[derive(Serialize)]
@@ -51,6 +106,8 @@ pub struct Line {
     pub applies: bool,
     pub failed: bool,
     pub cells: Vec<(String, Option<String>)>,
+    /// The interval of the mean time.
+    pub interval: String,
 }
 
 /// One table per level; `methods` has all methods of the run, so that one that is absent
@@ -82,6 +139,7 @@ fn line(group: &Group, method: &str, paper: &[PaperRow]) -> Line {
         applies: summary.is_some(),
         failed: summary.is_some_and(|s| s.fail_percent > 0.0),
         cells: ours.into_iter().zip(theirs).collect(),
+        interval: summary.map_or("–".to_owned(), |s| span(s.mean_t_interval_s, 1e3)),
     }
 }
 
