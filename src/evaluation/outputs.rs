@@ -74,8 +74,10 @@ impl Outputs {
         let (file, traces) = (out.join("rows.csv"), out.join(TRACES));
         let done = if file.exists() { rows::read_csv(&file)? } else { Vec::new() };
         let scenes: HashSet<&str> = done.iter().map(|r| r.scene.as_str()).collect();
-        let traces = trace::read(&traces, &scenes)
+        let keys: HashSet<_> = done.iter().map(Row::key).collect();
+        let mut traces = trace::read(&traces, &scenes)
             .map_err(|error| OutputError::File { path: traces, error })?;
+        traces.retain(|t| keys.contains(&t.key()));
         let mut outputs = Self::create(Some(out), None)?;
         traces.iter().try_for_each(|t| outputs.push_trace(t))?;
         done.iter().try_for_each(|row| outputs.push(row))?;

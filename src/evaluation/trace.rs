@@ -144,7 +144,7 @@ mod tests {
         assert_eq!(read(&path, &HashSet::from(["c"])).unwrap(), [blocked.clone()]);
         let bytes = std::fs::read(&path).unwrap();
         std::fs::write(&path, &bytes[..bytes.len() - 9]).unwrap();
-        assert_eq!(read(&path, &all).unwrap(), [blocked, trace]);
+        assert_eq!(read(&path, &all).unwrap(), [blocked, trace.clone()]);
         assert!(read(&dir.path().join("none"), &all).unwrap().is_empty());
     }
 }

@@ -120,7 +120,7 @@
     element("polygon", { points: points(scene, footprint(pose, vehicle)), class: kind }, layer);
     const tip = vehicle.length - vehicle.rear_overhang - 0.4;
     const arrow = [corner(pose, tip - 0.7, 0.4), corner(pose, tip, 0), corner(pose, tip - 0.7, -0.4)];
-    element("polyline", { points: points(scene, arrow), class: kind, "stroke-dasharray": "none" }, layer);
+    element("polyline", { points: points(scene, arrow), class: `${kind} arrow` }, layer);
   }
 
   /** The car in its own frame (rear axle at the origin, front to the right). */
@@ -417,7 +417,7 @@
     document.querySelector(".viewer").hidden = false;
     listen();
     if (follow()) {
-      at("gallery").scrollIntoView();
+      at("gallery").scrollIntoView({ behavior: "instant" });
     } else {
       // At first a scene of the last, hardest setting, and our own method if it takes part.
       const last = data.scenes.at(-1);

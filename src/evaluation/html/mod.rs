@@ -129,3 +129,102 @@ fn embedded(value: &impl Serialize) -> String {
 fn escape(text: &str) -> String {
     minijinja::HtmlEscape(text).to_string()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::metrics::tests::row;
+    use super::*;
+    use crate::geometry::Pose;
+    use crate::vehicle::Vehicle;
+    use crate::world::generate::{GeneratorConfig, generate};
+    use crate::world::{Level, ParkingType};
+
+    fn cases(count: u64) -> Vec<Case> {
+        let (config, vehicle) = (GeneratorConfig::default(), Vehicle::default());
+        let (kind, level) = (ParkingType::Parallel, Level::Extreme);
+        let case = |i| Case {
+            scene: generate(&config, &vehicle, kind, level, 77, i),
+            kind: Some(kind),
+            level: Some(level),
+        };
+        (0..count).map(case).collect()
+    }
+
+    fn whole_page(cases: &[Case], rows: &[Row], traces: &[Trace]) -> String {
+        let provenance = Provenance::here("by hand".into(), 7, 100, 1);
+        page("A & B", rows, &provenance, &gallery::chosen(cases, rows), traces)
+    }
+
+    /// The text between `before` and `after`.
+    fn part<'a>(page: &'a str, before: &str, after: &str) -> &'a str {
+        let rest = page.split(before).nth(1).unwrap_or_else(|| panic!("no {before}"));
+        rest.split(after).next().unwrap()
+    }
+
+    #[test]
+    fn hostile_names_stay_text_and_the_data_goes_round() {
+        const NAME: &str = "</script><img src=x onerror=alert(1)> \"'&amp;\u{2028}é {{ title }}";
+        let mut cases = cases(2);
+        cases[1].scene.name = NAME.into();
+        let first = cases[0].scene.name.clone();
+        let rows = [
+            row(&first, "n3p", 1e-5, true),
+            row(&first, "<b>own</b>", 0.1, true),
+            row(NAME, "n3p", 1e-5, false),
+            row(NAME, "<b>own</b>", 0.1, true),
+        ];
+        let traces = [Trace {
+            scene: NAME.into(),
+            method: "<b>own</b>".into(),
+            start: Some(Pose::new(0.1 + 0.2, -1.0 / 3.0, 2e-17)),
+            segments: vec![[1.0 / 7.0, -0.7], [0.0, 1.0 / 3.0]],
+            regions: None,
+            preparatory: Some(Pose::default()),
+        }];
+        let html = whole_page(&cases, &rows, &traces);
+        for raw in ["<img", "<b>own", "</script><"] {
+            assert!(!html.contains(raw), "{raw}");
+        }
+        assert!(html.contains("&lt;b&gt;own") && html.contains("A &amp; B"));
+        assert!(html.contains("é {{ title }}"), "names are no templates");
+        let data = part(&html, "id=\"data\">", "</script>");
+        assert!(!data.contains(['<', '\u{2028}']));
+        let gallery: Gallery = serde_json::from_str(data).unwrap();
+        assert_eq!(gallery, Gallery::new(&cases.iter().collect::<Vec<_>>(), &rows, &traces));
+        assert_eq!(gallery.scenes[1].name, NAME);
+        let run = &gallery.scenes[1].runs[1];
+        assert_eq!((run.start, &run.segments), (traces[0].start, &traces[0].segments));
+        assert!(html.contains("href=\"#play-1-0\""), "the failure leads to its scene");
+        assert_eq!(html, whole_page(&cases, &rows, &traces), "same rows, same page");
+    }
+
+    #[test]
+    fn the_page_needs_nothing_else_and_knows_both_themes() {
+        let cases = cases(1);
+        let html = whole_page(&cases, &[row(&cases[0].scene.name, "ha-rs", 0.1, true)], &[]);
+        for outside in ["http:", "https:", "//", "src=", "url(", "@import", "<link", "fetch("] {
+            let page = html.replace("\n//", "").replace("  //", "").replace(" // ", "");
+            assert!(!page.contains(outside), "{outside}");
+        }
+        for theme in ["color-scheme: light dark", "color-scheme: dark", "light-dark("] {
+            assert!(html.contains(theme), "{theme}");
+        }
+        assert!(html.contains("None in 1 episodes."));
+    }
+
+    #[test]
+    fn a_run_without_scenes_or_methods_is_still_a_page() {
+        assert!(whole_page(&[], &[], &[]).contains("None in 0 episodes."));
+    }
+
+    #[test]
+    fn the_gallery_takes_the_first_scenes_and_some_failures() {
+        let cases = cases(60);
+        let name = |i: usize| cases[i].scene.name.clone();
+        let rows: Vec<Row> =
+            (0..60).map(|i| row(&name(i), "ha-rs", 0.1, i < 15 || i % 2 == 1)).collect();
+        let chosen = gallery::chosen(&cases, &rows);
+        assert_eq!(chosen.len(), gallery::FIRST + gallery::FAILED);
+        assert_eq!(chosen[gallery::FIRST].scene.name, name(16));
+    }
+}
