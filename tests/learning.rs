@@ -38,6 +38,7 @@ fn metadata() -> Metadata {
         max_expansions: 1000,
         solutions: 1,
         samples_per_cell: 50,
+        start_behind: 0.0,
         start_heading_max: 0.5,
         cells_per_shard: 4,
         seed: 7,

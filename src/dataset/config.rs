@@ -28,6 +28,9 @@ pub struct CollectConfig {
     pub solutions: u32,
     /// Samples per cell, 1 to 10⁶.
     pub samples_per_cell: u32,
+    /// How far behind a cell's lane starts may lie, metres, 0 to 50; the lane is taken to go on
+    /// there. Cars come along it, from farther than the cell reaches.
+    pub start_behind: f64,
     /// Start headings are uniform in ± this angle, radians, 0 to π.
     pub start_heading_max: f64,
     /// Consecutive cells per file; a file holds at most 2²⁰ rows.
@@ -45,6 +48,7 @@ impl Default for CollectConfig {
             max_expansions: 50_000,
             solutions: 20,
             samples_per_cell: 100,
+            start_behind: 8.0,
             start_heading_max: PI / 3.0,
             cells_per_shard: 16,
             seed: 1,
@@ -97,11 +101,20 @@ impl CollectConfig {
                 Self::MAX_SHARD_ROWS
             )));
         }
+        let behind = self.start_behind;
+        if !(0.0..=50.0).contains(&behind) {
+            return Err(bad(format!("start_behind is {behind}; expected 0 to 50 metres")));
+        }
         let heading = self.start_heading_max;
         if !(0.0..=PI).contains(&heading) {
             return Err(bad(format!("start_heading_max is {heading}; expected 0 to π radians")));
         }
         Ok(())
+    }
+
+    /// The grid of cells whose lanes go on to where starts may lie.
+    pub(super) fn grid_with_lane_behind(&self) -> Grid {
+        self.grid.with_lane_behind(self.start_behind)
     }
 
     /// What files collected with these settings by this build say about themselves.
@@ -114,6 +127,7 @@ impl CollectConfig {
             max_expansions: self.max_expansions,
             solutions: self.solutions,
             samples_per_cell: self.samples_per_cell,
+            start_behind: self.start_behind,
             start_heading_max: self.start_heading_max,
             cells_per_shard: self.cells_per_shard,
             seed: self.seed,

@@ -9,7 +9,7 @@ use crate::geometry::{Aabb, Pose, wrap_angle};
 use crate::planners::{AnalyticTail, Budget, HybridAStar, NoPath, PlanResult, Planner, Problem};
 use crate::rng::{Stream, rng};
 use crate::world::ParkingType;
-use crate::world::cell::Cell;
+use crate::world::cell::{Cell, Grid};
 
 /// A cell none of whose first samples is solved is given up: in most such cells the car
 /// cannot park at all, and every further sample would spend its whole budget.
@@ -31,9 +31,15 @@ struct CellProblem {
     cell: Cell,
     index: u32,
     /// `None` when the car does not fit the spot.
-    problem: Option<Problem>,
+    problems: Option<CellProblems>,
     /// The first samples, once solved.
     probes: Vec<Sample>,
+}
+
+/// The cell, and the same with a longer lane behind, where starts may lie as well.
+struct CellProblems {
+    cell: Problem,
+    with_lane_behind: Problem,
 }
 
 impl CellProblem {
@@ -85,9 +91,11 @@ impl<'a> Sampler<'a> {
         };
         let nan = f64::NAN;
         let no_start = unsolved(Pose::new(nan, nan, nan), Status::NoStart);
-        let Some(problem) = &mut here.problem else { return no_start };
+        let Some(CellProblems { cell, with_lane_behind: problem }) = &mut here.problems else {
+            return no_start;
+        };
         let mut rng = rng(config.seed, Stream::Start, stream_index(kind, cell_index, sample_index));
-        let [lane, _] = config.grid.regions(&here.cell);
+        let [lane, _] = config.grid_with_lane_behind().regions(&here.cell);
         let Some(start) = (0..MAX_DRAWS)
             .map(|_| draw(&mut rng, &lane, config.start_heading_max))
             .find(|pose| problem.collision.pose_is_free(*pose))
@@ -100,7 +108,7 @@ impl<'a> Sampler<'a> {
         let result = self.planner.plan(problem, budget);
         let tail = result.outcome.as_ref().ok().and_then(|path| {
             let snap = |p: Pose| to_step(Pose { heading: wrap_angle(p.heading), ..p });
-            self.planner.preparatory_tail(problem, path, snap)
+            self.planner.preparatory_tail(problem, cell, path, snap)
         });
         let mut row = fill(unsolved(start, Status::NoPath), &result, tail.as_ref()).rounded();
         if let Ok(path) = &result.outcome
@@ -118,8 +126,11 @@ impl CellProblem {
         let cell = config.grid.cell(kind, index as usize);
         // The goal stands in as start: with it, only a spot too narrow for the car fails.
         let goal = config.grid.goal(kind, &config.vehicle);
-        let problem = Problem::in_cell(&config.grid, &cell, config.vehicle, goal).ok();
-        Self { cell, index, problem, probes: Vec::new() }
+        let problem = |grid: &Grid| Problem::in_cell(grid, &cell, config.vehicle, goal).ok();
+        let (own, longer) = (problem(&config.grid), problem(&config.grid_with_lane_behind()));
+        let problems =
+            own.zip(longer).map(|(cell, with_lane_behind)| CellProblems { cell, with_lane_behind });
+        Self { cell, index, problems, probes: Vec::new() }
     }
 }
 

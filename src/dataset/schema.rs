@@ -11,7 +11,7 @@ use crate::vehicle::Vehicle;
 use crate::world::cell::{Cell, Grid};
 
 /// Version of the data format that this crate writes and reads.
-pub const FORMAT_VERSION: u32 = 2;
+pub const FORMAT_VERSION: u32 = 3;
 
 /// Git revision of this build; `unknown` outside a checkout.
 pub const GIT_REVISION: &str = env!("N3P_GIT_REVISION");
@@ -239,6 +239,8 @@ pub struct Metadata {
     pub solutions: u32,
     /// Samples per cell.
     pub samples_per_cell: u32,
+    /// How far behind a cell's lane starts lie, metres.
+    pub start_behind: f64,
     /// Start headings are uniform in ± this angle, radians.
     pub start_heading_max: f64,
     /// Consecutive cells per file.

@@ -8,6 +8,7 @@
 //! [`ScenarioHybridAStar`] (parallel spots). [`library`] does without any search.
 
 pub mod analytic;
+mod config;
 pub mod cost;
 mod cost_to_go;
 mod exit_manoeuvre;
@@ -24,7 +25,8 @@ mod scenario;
 mod search;
 
 pub use analytic::AnalyticTail;
-pub use hybrid_astar::{GoalRegion, HybridAStar, HybridAStarConfig, Resolution};
+pub use config::{GoalRegion, HybridAStarConfig, Resolution};
+pub use hybrid_astar::HybridAStar;
 pub use multi_heuristic::{MultiHeuristicConfig, MultiHeuristicHybridAStar};
 pub use plain::PlainHybridAStar;
 pub use problem::{Problem, ProblemError};

@@ -21,7 +21,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::hybrid_astar::{HybridAStar, HybridAStarConfig};
+use super::config::HybridAStarConfig;
+use super::hybrid_astar::HybridAStar;
 use super::search::Estimate;
 use super::{Budget, PlanResult, Planner, Problem};
 use crate::geometry::Pose;

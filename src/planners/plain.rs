@@ -9,7 +9,7 @@
 //! (`joint.rs`); where that fails the search goes on.
 
 use super::analytic::GoalSet;
-use super::hybrid_astar::{HybridAStarConfig, Resolution};
+use super::config::{HybridAStarConfig, Resolution};
 use super::search::Search;
 use super::{Budget, NoPath, PlanResult, Planner, Problem, joint};
 use crate::curves::Path;

@@ -9,7 +9,8 @@
 //! 2. A search to the exits, with half of the budget.
 //! 3. The search of `ha-rs` with the rest, where there is no exit or no way to one.
 
-use super::hybrid_astar::{HybridAStar, HybridAStarConfig, Leg};
+use super::config::HybridAStarConfig;
+use super::hybrid_astar::{HybridAStar, Leg};
 use super::{Budget, NoPath, PlanResult, Planner, Problem, exit_manoeuvre};
 use crate::world::ParkingType;
 

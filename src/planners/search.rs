@@ -11,9 +11,10 @@ use crate::vehicle::{Gear, Vehicle};
 use crate::world::collision::{BodyFrame, Sweep};
 
 use super::analytic::GoalSet;
+use super::config::{HybridAStarConfig, Resolution};
 use super::cost::{CostModel, DriveState};
 use super::cost_to_go::CostToGo;
-use super::hybrid_astar::{HybridAStarConfig, Resolution, inscribed_radius};
+use super::hybrid_astar::inscribed_radius;
 use super::lattice::Lattice;
 use super::multi_heuristic::Guides;
 use super::nonholonomic::NonHolonomic;

@@ -82,7 +82,7 @@ impl GuidedPlanner {
     }
 
     /// The best plan by a known manoeuvre.
-    fn look_up(&mut self, problem: &Problem, goal: &GoalSet) -> Option<LibraryPlan> {
+    fn look_up(&mut self, problem: &Problem) -> Option<LibraryPlan> {
         let kind = problem.kind?;
         let (vehicle, cost) = (&problem.vehicle, &self.hars.config().cost);
         let footprint = problem.collision.footprint();
@@ -93,7 +93,7 @@ impl GuidedPlanner {
             self.libraries.len() - 1
         });
         let library = &self.libraries[at].1;
-        self.library_search.plan(library, problem, goal, cost, f64::INFINITY)
+        self.library_search.plan(library, problem, cost, f64::INFINITY)
     }
 
     fn plan_paper(
@@ -124,15 +124,15 @@ impl GuidedPlanner {
         found: &[Abstraction],
         left: &mut usize,
     ) -> Result<(Path, Guidance), NoPath> {
-        let plain = self.hars.goal_set(problem);
-        if let Some(plan) = self.look_up(problem, &plain) {
+        if let Some(plan) = self.look_up(problem) {
             let guidance = Guidance {
                 abstraction: found.first().copied(),
-                preparatory: plan.manoeuvre.map(|_| plan.preparatory),
+                preparatory: Some(plan.preparatory),
                 route: Route::Direct,
             };
             return Ok((plan.path, guidance));
         }
+        let plain = self.hars.goal_set(problem);
         let mut goal = plain.clone();
         for found in found.iter().take(ABSTRACTIONS) {
             self.select(problem, found, CANDIDATES);

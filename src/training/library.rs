@@ -4,21 +4,25 @@
 //! from the tightest cells to the widest, the manoeuvre that ends its path is added to the
 //! library, unless the library already has a plan for the sample that costs hardly more.
 //! Then the samples are planned once more with the whole library, and what hardly any of
-//! them uses is left out.
+//! them uses, or what is mostly tried in vain, is left out.
 
-use crate::curves::{Segment, reeds_shepp};
+use crate::curves::{Path, Segment, reeds_shepp};
 use crate::dataset::{Metadata, Sample};
-use crate::geometry::Pose;
+use crate::geometry::{Aabb, Pose};
 use crate::planners::hybrid_astar::GoalSet;
 use crate::planners::library::{Library, LibrarySearch};
 use crate::planners::{HybridAStar, Problem};
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
+use crate::world::collision::BodyFrame;
 
 /// A plan that costs at most this much more than a sample's own serves it.
 const TOLERANCE: f64 = 0.5;
 /// A manoeuvre must serve this many samples to stay.
 const LEAST_USES: usize = 2;
+/// A manoeuvre must serve one of this many samples that it was tried for: what looks good and
+/// is not reached costs every plan time.
+const MOST_TRIES_PER_USE: usize = 20;
 /// More samples than this find hardly any new manoeuvre; those of lowest index in their cells
 /// are taken.
 const MOST_SAMPLES: usize = 10_000;
@@ -36,26 +40,37 @@ pub(super) fn condense(
     let mut manoeuvres = Vec::new();
     let taken = spread(solved);
     for_each_problem(metadata, kind, &taken, |sample, problem| {
-        let Some(manoeuvre) = manoeuvre(sample, problem) else { return };
-        let goal = hars.goal_set(problem);
-        let Some(own) = own_cost(&mut hars, &manoeuvre, problem) else { return };
-        let bound = own + TOLERANCE;
-        if search.plan(&library, problem, &goal, &planner.cost, bound).is_none() {
+        let Some((manoeuvre, cost)) = ending(&mut hars, metadata, sample, problem) else { return };
+        if search.plan(&library, problem, &planner.cost, cost + TOLERANCE).is_none() {
             library.add(manoeuvre.clone(), vehicle, &planner.cost);
             manoeuvres.push(manoeuvre);
         }
     });
-    let mut uses = vec![0; manoeuvres.len()];
+    let mut records = vec![Record::default(); manoeuvres.len()];
     for_each_problem(metadata, kind, &taken, |_, problem| {
-        let goal = hars.goal_set(problem);
-        let plan = search.plan(&library, problem, &goal, &planner.cost, f64::INFINITY);
-        if let Some(used) = plan.and_then(|p| p.manoeuvre) {
-            uses[used] += 1;
+        if let Some(plan) = search.plan(&library, problem, &planner.cost, f64::INFINITY) {
+            records[plan.manoeuvre].uses += 1;
+            search.tried().for_each(|i| records[i].tries += 1);
         }
     });
-    let mut uses = uses.into_iter();
-    manoeuvres.retain(|_| uses.next().is_some_and(|n| n >= LEAST_USES));
+    let mut records = records.into_iter();
+    manoeuvres.retain(|_| records.next().is_some_and(|r| r.is_worth_it()));
     manoeuvres
+}
+
+/// How a manoeuvre of the whole library fared.
+#[derive(Clone, Copy, Default)]
+struct Record {
+    /// Samples planned with it.
+    uses: usize,
+    /// Samples where it was free and a curve to it was looked for.
+    tries: usize,
+}
+
+impl Record {
+    fn is_worth_it(self) -> bool {
+        self.uses >= LEAST_USES && self.uses * MOST_TRIES_PER_USE >= self.tries
+    }
 }
 
 /// At most [`MOST_SAMPLES`]: the first ones of every cell, in order of cells.
@@ -78,9 +93,10 @@ fn for_each_problem(
     let Metadata { vehicle, grid, .. } = metadata;
     let footprint = vehicle.footprint(Problem::MARGIN);
     let goal = grid.goal(kind, vehicle);
+    let grid = grid.with_lane_behind(metadata.start_behind);
     for of_cell in samples.chunk_by(|a, b| a.cell_index == b.cell_index) {
         // The goal stands in as start.
-        let Ok(mut problem) = Problem::in_cell(grid, &of_cell[0].cell, *vehicle, goal) else {
+        let Ok(mut problem) = Problem::in_cell(&grid, &of_cell[0].cell, *vehicle, goal) else {
             continue;
         };
         if *problem.collision.footprint() != footprint {
@@ -93,8 +109,60 @@ fn for_each_problem(
     }
 }
 
-/// How a sample's path ends: the stored manoeuvre, or else the curve and the entry straight.
-fn manoeuvre(sample: &Sample, problem: &Problem) -> Option<Vec<Segment>> {
+/// How a sample's path ends, from outside the spot on, and the cost of the whole path.
+fn ending(
+    hars: &mut HybridAStar,
+    metadata: &Metadata,
+    sample: &Sample,
+    problem: &Problem,
+) -> Option<(Vec<Segment>, f64)> {
+    let (vehicle, model) = (&problem.vehicle, hars.config().cost);
+    let known = known_ending(sample, problem)?;
+    let begin = known.iter().rev().fold(problem.goal, |pose, s| s.reversed().end(pose));
+    let mut goal = GoalSet::single(problem.goal);
+    goal.add_preparatory(begin, known.clone(), vehicle, &model);
+    let leg = hars.direct(problem, problem.start, &goal.only_preparatory()?)?;
+    let known_length = known.iter().map(|s| s.length.abs()).sum::<f64>() - 1e-6;
+    let boundary = metadata.grid.lane_boundary(sample.cell.kind);
+    let footprint = problem.collision.footprint();
+    Some((outside(&leg.path, known_length, boundary, footprint), leg.cost))
+}
+
+/// The end of `path` that is at least `length` metres long and begins where the car stands
+/// clear of the spot's row: what happens within the spot is part of the manoeuvre, and the curve
+/// that joins it stays in the lane.
+fn outside(path: &Path, length: f64, boundary: f64, footprint: &Aabb) -> Vec<Segment> {
+    /// Distance between the poses looked at, metres.
+    const STEP: f64 = 0.1;
+    let is_outside = |pose: Pose| {
+        let body = BodyFrame::new(pose);
+        footprint.corners().into_iter().all(|c| body.parent(c).y >= boundary)
+    };
+    let mut driven = 0.0;
+    let mut ending = Vec::new();
+    let legs: Vec<(Pose, Segment)> = path.legs().collect();
+    for (begin, segment) in legs.into_iter().rev() {
+        let whole = segment.length.abs();
+        let steps = (whole / STEP).ceil().max(1.0) as usize;
+        for i in (0..steps).rev() {
+            let cut = segment.length * i as f64 / steps as f64;
+            let rest = Segment { length: segment.length - cut, ..segment };
+            if driven + rest.length.abs() >= length && is_outside(segment.at(begin, cut)) {
+                ending.push(rest);
+                ending.reverse();
+                return ending;
+            }
+        }
+        driven += whole;
+        ending.push(segment);
+    }
+    ending.reverse();
+    ending
+}
+
+/// The motions that a sample keeps of its path's end: the stored manoeuvre, or else the curve
+/// and the entry straight.
+fn known_ending(sample: &Sample, problem: &Problem) -> Option<Vec<Segment>> {
     if !sample.manoeuvre.is_empty() {
         return Some(sample.manoeuvre.clone());
     }
@@ -114,13 +182,4 @@ fn stored_word(sample: &Sample, to: Pose, vehicle: &Vehicle) -> Option<reeds_she
     };
     words.retain(|w| w.name() == sample.rs_word && !w.segments().is_empty());
     words.into_iter().min_by(|a, b| difference(a).total_cmp(&difference(b)))
-}
-
-/// The least cost of a curve from the start to where `manoeuvre` begins, and of that.
-fn own_cost(hars: &mut HybridAStar, manoeuvre: &[Segment], problem: &Problem) -> Option<f64> {
-    let begin = manoeuvre.iter().rev().fold(problem.goal, |pose, s| s.reversed().end(pose));
-    let (vehicle, cost) = (&problem.vehicle, &hars.config().cost);
-    let mut goal = GoalSet::single(problem.goal);
-    goal.add_preparatory(begin, manoeuvre.to_vec(), vehicle, cost);
-    hars.direct(problem, problem.start, &goal.only_preparatory()?).map(|leg| leg.cost)
 }

@@ -150,6 +150,11 @@ impl Grid {
         Ok(())
     }
 
+    /// The grid of the same cells with lanes `behind` metres longer at the back.
+    pub fn with_lane_behind(&self, behind: f64) -> Grid {
+        Grid { back: self.back + behind, ..*self }
+    }
+
     /// The W_spot axis of a parking type.
     pub fn spot_width(&self, kind: ParkingType) -> &Axis {
         if kind.is_bay() { &self.bay_spot_width } else { &self.parallel_spot_width }

@@ -1,0 +1,224 @@
+//! Settings of the Hybrid A* methods, and what they share.
+
+use serde::{Deserialize, Serialize};
+
+use crate::geometry::{Aabb, Pose, signed_angle};
+
+use super::analytic::GoalSet;
+use super::cost::CostModel;
+use super::multi_heuristic::MultiHeuristicConfig;
+use super::{NoPath, Problem};
+
+/// Settings of the search.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct HybridAStarConfig {
+    /// The cost of driving.
+    pub cost: CostModel,
+    /// The lattices, coarse to fine: each is tried when the one before is exhausted or has
+    /// spent half of what was left of the budget.
+    pub resolutions: [Resolution; 3],
+    /// Side of a cell of the A* cost-to-go, metres.
+    pub cost_to_go_cell: f64,
+    /// The search stays within the box of start and goal grown by this, metres.
+    pub domain_margin: f64,
+    /// Whether a straight may lead into a bay (the goal set). `false` asks for curves that
+    /// end at the parked pose itself: an ablation.
+    pub entry_straight: bool,
+    /// Distance between entry poses, metres.
+    pub entry_step: f64,
+    /// Longest entry straight, metres.
+    pub entry_max: f64,
+    /// Weight of the heuristic; 1 is A*.
+    pub heuristic_weight: f64,
+    /// What counts as arrived for the method `ha`, which has no curves to arrive exactly.
+    pub goal_region: GoalRegion,
+    /// The queues of the method `mhha`.
+    pub multi_heuristic: MultiHeuristicConfig,
+}
+
+/// How near a search without curves must come before its path may be bent to fit (see
+/// `joint.rs`).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct GoalRegion {
+    /// Largest distance, metres.
+    pub position: f64,
+    /// Largest difference of headings, radians.
+    pub heading: f64,
+}
+
+impl Default for GoalRegion {
+    fn default() -> Self {
+        Self { position: 0.25, heading: 5_f64.to_radians() }
+    }
+}
+
+impl GoalRegion {
+    /// Whether `pose` lies in the region around `target`.
+    pub fn contains(&self, target: Pose, pose: Pose) -> bool {
+        pose.distance(target) <= self.position
+            && signed_angle(target.heading, pose.heading).abs() <= self.heading
+    }
+}
+
+/// How finely a search looks.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Resolution {
+    /// Side of a lattice cell, metres.
+    pub cell: f64,
+    /// Heading bins of the lattice.
+    pub headings: usize,
+    /// Arc length of a motion primitive, metres.
+    pub step: f64,
+    /// Steering angles of the primitives, evenly spaced from full left to full right.
+    pub steers: usize,
+}
+
+impl Resolution {
+    fn validate(&self) -> Result<(), String> {
+        let number = |field: &str, v: f64, low: f64, high: f64| {
+            if (low..=high).contains(&v) {
+                return Ok(());
+            }
+            Err(format!(
+                "planner.resolutions.{field} is {v}; expected a number from {low} to {high}"
+            ))
+        };
+        number("cell", self.cell, 0.02, 5.0)?;
+        number("headings", self.headings as f64, 8.0, 1440.0)?;
+        number("step", self.step, 0.02, 10.0)?;
+        number("steers", self.steers as f64, 3.0, 63.0)?;
+        if self.steers.is_multiple_of(2) {
+            let steers = self.steers;
+            return Err(format!("planner.resolutions.steers is {steers}; expected an odd number"));
+        }
+        Ok(())
+    }
+}
+
+impl Default for HybridAStarConfig {
+    fn default() -> Self {
+        Self {
+            cost: CostModel::default(),
+            resolutions: [
+                Resolution { cell: 0.25, headings: 120, step: 0.4, steers: 5 },
+                Resolution { cell: 0.05, headings: 360, step: 0.2, steers: 3 },
+                Resolution { cell: 0.02, headings: 720, step: 0.05, steers: 3 },
+            ],
+            cost_to_go_cell: 0.5,
+            domain_margin: 12.0,
+            entry_straight: true,
+            entry_step: 1.0,
+            entry_max: 5.0,
+            heuristic_weight: 1.0,
+            goal_region: GoalRegion::default(),
+            multi_heuristic: MultiHeuristicConfig::default(),
+        }
+    }
+}
+
+impl HybridAStarConfig {
+    /// Checks every field; the error says field, value and what would be right.
+    pub fn validate(&self) -> Result<(), String> {
+        self.cost.validate()?;
+        for (field, v, low, high) in [
+            ("cost_to_go_cell", self.cost_to_go_cell, 0.05, 5.0),
+            ("domain_margin", self.domain_margin, 1.0, 1000.0),
+            ("entry_step", self.entry_step, 0.05, 10.0),
+            ("entry_max", self.entry_max, 0.0, 50.0),
+            ("heuristic_weight", self.heuristic_weight, 0.0, 100.0),
+            ("goal_region.position", self.goal_region.position, 0.01, 5.0),
+            ("goal_region.heading", self.goal_region.heading, 0.001, 1.6),
+            ("multi_heuristic.slack", self.multi_heuristic.slack, 1.0, 100.0),
+            ("multi_heuristic.inflation", self.multi_heuristic.inflation, 0.0, 100.0),
+            ("multi_heuristic.depth", self.multi_heuristic.depth, 0.0, 100.0),
+        ] {
+            if !(v.is_finite() && (low..=high).contains(&v)) {
+                return Err(format!(
+                    "planner.{field} is {v}; expected a number from {low} to {high}"
+                ));
+            }
+        }
+        self.resolutions.iter().try_for_each(Resolution::validate)
+    }
+
+    /// The goal of `problem` with the entry straights that are free.
+    pub(super) fn goal_set(&self, problem: &Problem) -> GoalSet {
+        let mut goal = GoalSet::single(problem.goal);
+        self.add_straights(problem, 0.0, &mut goal);
+        goal
+    }
+
+    /// Adds the free entry straights of `offset` plus a multiple of the step, metres.
+    pub(super) fn add_straights(&self, problem: &Problem, offset: f64, goal: &mut GoalSet) {
+        if self.entry_straight {
+            let (step, longest) = (self.entry_step, self.entry_max);
+            goal.add_straights(problem, &self.cost, offset, step, longest);
+        }
+    }
+
+    /// Where a search may go: around start and goal, within the bounds.
+    pub(super) fn domain(&self, problem: &Problem, start: Pose, goal: Pose) -> Aabb {
+        let around = Aabb::around([start.position(), goal.position()]);
+        let mut domain = around.inflated(self.domain_margin);
+        if let Some(bounds) = problem.collision.bounds_aabb() {
+            domain.min = domain.min.sup(&bounds.min);
+            domain.max = domain.max.inf(&bounds.max);
+        }
+        domain
+    }
+
+    /// Runs `search` on each lattice, coarse to fine, until it finds something or the goal
+    /// turns out to be enclosed. `expansions` is reduced by what was spent: finer lattices
+    /// are left their share even when a coarse one goes on and on.
+    pub(super) fn coarse_to_fine<T>(
+        &self,
+        expansions: &mut usize,
+        mut search: impl FnMut(&Resolution, &mut usize) -> Result<T, NoPath>,
+    ) -> Result<T, NoPath> {
+        let mut result = Err(NoPath::BudgetSpent);
+        for (i, resolution) in self.resolutions.iter().enumerate() {
+            let last = i + 1 == self.resolutions.len();
+            let reserve = if last { 0 } else { *expansions / 2 };
+            *expansions -= reserve;
+            result = search(resolution, expansions);
+            *expansions += reserve;
+            if !matches!(result, Err(NoPath::BudgetSpent | NoPath::Exhausted)) {
+                break;
+            }
+        }
+        result
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn the_goal_region_has_the_tolerances_it_says() {
+        let region = GoalRegion { position: 0.2, heading: 0.1 };
+        let target = Pose::new(1.0, 2.0, PI - 0.02);
+        let within = |dx, dy, turn| {
+            region.contains(target, Pose::new(1.0 + dx, 2.0 + dy, target.heading + turn))
+        };
+        assert!(within(0.0, 0.0, 0.0) && within(0.19, 0.0, -0.09) && within(0.1, -0.1, 0.09));
+        assert!(!within(0.15, 0.15, 0.0) && !within(0.0, 0.0, 0.11) && !within(0.0, 0.0, PI));
+        // Beyond π the heading begins again at −π.
+        assert!(region.contains(target, Pose { heading: 0.05 - PI, ..target }));
+    }
+
+    #[test]
+    fn settings_out_of_range_are_named() {
+        let mut config = HybridAStarConfig::default();
+        assert_eq!(config.validate(), Ok(()));
+        config.goal_region.position = f64::NAN;
+        assert!(config.validate().unwrap_err().contains("planner.goal_region.position is NaN"));
+        config = HybridAStarConfig::default();
+        config.multi_heuristic.slack = 0.5;
+        assert!(config.validate().unwrap_err().contains("planner.multi_heuristic.slack is 0.5"));
+    }
+}
