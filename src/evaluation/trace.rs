@@ -30,7 +30,7 @@ pub struct Trace {
     /// Its motions in driving order: curvature (1/m) and signed length (m).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub segments: Vec<[f64; 2]>,
-    /// The corners of the abstraction's two rectangles, lane and spot.
+    /// The corners of the abstraction's two rectangles, lane and spot, to the millimetre.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub regions: Option<[Vec<[f64; 2]>; 2]>,
     /// The preparatory pose.
@@ -51,8 +51,9 @@ impl Trace {
             segments: path
                 .map(|p| p.segments.iter().map(|s| [s.curvature, s.length]).collect())
                 .unwrap_or_default(),
-            regions: regions(episode, models)
-                .map(|both| both.map(|r| r.vertices().iter().map(|v| [v.x, v.y]).collect())),
+            regions: regions(episode, models).map(|both| {
+                both.map(|r| r.vertices().iter().map(|v| [v.x, v.y].map(mm)).collect())
+            }),
             preparatory: guidance.and_then(|g| g.preparatory).map(|p| frame.world_from_local(p)),
         }
     }
@@ -73,6 +74,12 @@ pub fn regions(episode: &Episode, models: &Models) -> Option<[Polygon; 2]> {
         Polygon::rectangle(Pose::default(), region).map(|v: Vec2| frame.world_from_local_point(v))
     };
     Some(found.regions(selector.grid()).map(to_world))
+}
+
+/// Rounded to thousandths.
+pub(super) fn mm(v: f64) -> f64 {
+    // Adding zero turns −0 into 0.
+    (v * 1e3).round() / 1e3 + 0.0
 }
 
 /// Appends traces to a file of JSON lines, each flushed at once.

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::super::episode::Case;
 use super::super::rows::Row;
-use super::super::trace::Trace;
+use super::super::trace::{Trace, mm};
 use crate::curves::{Path, Segment};
 use crate::geometry::{Aabb, Pose, Vec2};
 use crate::vehicle::Vehicle;
@@ -149,7 +149,6 @@ fn place<T: PartialEq + Clone>(all: &mut Vec<T>, value: &T) -> usize {
 
 impl Run {
     fn new(method: usize, row: &Row, trace: Option<&Trace>) -> Self {
-        let regions = trace.and_then(|t| t.regions.as_ref());
         Self {
             method,
             ok: row.ok,
@@ -163,8 +162,7 @@ impl Run {
             route: row.route.clone(),
             start: trace.and_then(|t| t.start),
             segments: trace.map(|t| t.segments.clone()).unwrap_or_default(),
-            regions: regions
-                .map(|both| both.each_ref().map(|r| r.iter().map(|&v| v.map(mm)).collect())),
+            regions: trace.and_then(|t| t.regions.clone()),
             preparatory: trace.and_then(|t| t.preparatory),
         }
     }
@@ -213,10 +211,4 @@ fn view(scene: &Scene, runs: &[Run]) -> Aabb {
     let corners = regions.map(|&[x, y]| Vec2::new(x, y));
     let footprint = |pose| scene.vehicle.footprint_at(pose).vertices().to_vec();
     Aabb::around(shown.into_iter().flat_map(footprint).chain(corners))
-}
-
-/// Rounded to thousandths.
-fn mm(v: f64) -> f64 {
-    // Adding zero turns −0 into 0.
-    (v * 1e3).round() / 1e3 + 0.0
 }

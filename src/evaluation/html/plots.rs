@@ -17,7 +17,7 @@ pub const DOTS: usize = 150;
 /// Sizes, in the panel's own units (about a pixel).
 const WIDTH: f64 = 400.0;
 const LEFT: f64 = 66.0;
-const RIGHT: f64 = 16.0;
+const RIGHT: f64 = 20.0;
 const TOP: f64 = 8.0;
 const LINE: f64 = 27.0;
 const BOTTOM: f64 = 34.0;

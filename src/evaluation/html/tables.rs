@@ -10,7 +10,7 @@ use super::super::rows::Row;
 use super::super::table::{self, PaperRow, figures, kind_name, level_title, numbers};
 use super::family;
 
-/// Heading, unit and meaning of a number's column.
+/// Heading (HTML), unit and meaning of a number's column.
 pub type Column = (&'static str, &'static str, &'static str);
 
 /// The paper's columns.
@@ -22,9 +22,9 @@ pub const COLUMNS: [Column; 10] = [
     ("Δδ", "rad", "mean change of the steering angle in 0.1 s"),
     ("length", "m", "mean length of the solved paths"),
     ("fail", "%", "share of scenes without an accepted path"),
-    ("N_dc", "", "mean number of direction changes"),
-    ("max N_dc", "", "largest number of direction changes"),
-    ("N_node", "", "mean number of node expansions"),
+    ("N<sub>dc</sub>", "", "mean number of direction changes"),
+    ("max N<sub>dc</sub>", "", "largest number of direction changes"),
+    ("N<sub>node</sub>", "", "mean number of node expansions"),
 ];
 
 /// A method over all scenes.
