@@ -148,7 +148,7 @@ mod tests {
         }
         let all = HashSet::from([&trace.scene[..], "c"]);
         assert_eq!(read(&path, &all).unwrap(), [blocked.clone(), trace.clone()]);
-        assert_eq!(read(&path, &HashSet::from(["c"])).unwrap(), [blocked.clone()]);
+        assert_eq!(read(&path, &HashSet::from(["c"])).unwrap(), std::slice::from_ref(&blocked));
         let bytes = std::fs::read(&path).unwrap();
         std::fs::write(&path, &bytes[..bytes.len() - 9]).unwrap();
         assert_eq!(read(&path, &all).unwrap(), [blocked, trace.clone()]);

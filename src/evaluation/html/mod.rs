@@ -1,7 +1,7 @@
 //! `report.html`: one page that needs nothing but itself.
 //!
 //! The page's parts lie beside this file: `page.html` (a template), `style.css`, `theme.js`
-//! and `gallery.js`. This module fills in what the template names: [`tables`], [`plots`]
+//! and `gallery.js`. This module fills in what the template names: `tables`, `plots`
 //! (SVG, so that both can be read without scripts) and the data of the [`gallery`].
 
 pub mod gallery;
