@@ -23,6 +23,8 @@ pub enum Stream {
     Split = 5,
     /// Bootstrap resampling of the tables.
     Bootstrap = 6,
+    /// Starts and trials in the choice of what a network learns.
+    Targets = 7,
 }
 
 /// The generator of `(seed, stream, index)`.

@@ -13,7 +13,7 @@ use n3p::selectors::knn_file;
 use n3p::selectors::mlp::MlpSelector;
 use n3p::selectors::network::{LAYERS, pose_from_outputs};
 use n3p::selectors::{Features, PoseSelector};
-use n3p::training::{self, Loss, MlpConfig, TrainingError};
+use n3p::training::{self, Loss, MlpConfig, Targets, TrainingError, Validation};
 use n3p::vehicle::Vehicle;
 use n3p::world::ParkingType;
 use n3p::world::cell::{Axis, Grid};
@@ -227,7 +227,10 @@ fn one_file_holds_all_types_and_the_same_input_gives_the_same_bytes() {
 }
 
 fn quick(epochs: usize) -> MlpConfig {
-    MlpConfig { epochs, patience: epochs, batch: 64, seed: 11, ..MlpConfig::default() }
+    // The samples are made up: their poses are to be learnt as they are.
+    let (targets, validation) = (Targets::Stored, Validation::Cells);
+    let patience = epochs;
+    MlpConfig { epochs, patience, batch: 64, seed: 11, targets, validation, ..MlpConfig::default() }
 }
 
 fn train_mlp(samples: &[Sample], config: &MlpConfig, path: &Path) -> training::mlp::TrainingLog {
@@ -251,6 +254,8 @@ fn mlp_learns_a_smooth_mapping_reproducibly() {
         let again = dir.path().join("again.safetensors");
         train_mlp(&all, &config, &again);
         assert!(std::fs::read(&path).unwrap() == std::fs::read(&again).unwrap(), "same bytes");
+        let reach = log.reach;
+        assert!(reach.rows > 0 && reach.direct <= reach.to_goal && reach.to_goal <= 1.0);
         for extension in ["training.json", "training.svg"] {
             assert!(path.with_extension(extension).exists());
         }

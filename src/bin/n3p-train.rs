@@ -101,7 +101,7 @@ fn mlp(args: &MlpArgs) -> anyhow::Result<ExitCode> {
             .map_err(|e| exit_code(e, &args.common.data))?;
         cli::print(format!(
             "{}: {} rows, best of {} epochs is {}; on {} unseen rows the median error is {:.2} m, \
-             {:.1}°",
+             {:.1}°; {:.0} % have a free curve to the goal, {:.0} % one from the start, too",
             out.display(),
             log.train_rows,
             log.losses.len(),
@@ -109,6 +109,8 @@ fn mlp(args: &MlpArgs) -> anyhow::Result<ExitCode> {
             log.validation_rows,
             log.validation.position_median_m,
             log.validation.heading_median_rad.to_degrees(),
+            100.0 * log.reach.to_goal,
+            100.0 * log.reach.direct,
         ))?;
     }
     Ok(ExitCode::SUCCESS)

@@ -25,6 +25,9 @@ use super::{Features, PoseSelector};
 const CANDIDATES: usize = 12;
 /// How many abstractions `n3p` tries.
 const ABSTRACTIONS: usize = 3;
+/// Expansions that the paper's two legs may spend, so that a pose just beside the feasible
+/// ones does not use up what the full search needs.
+const LEG_EXPANSIONS: usize = 5_000;
 /// Expansions that `n3p` spends on the way to the preparatory poses before it searches for
 /// the goal itself.
 const APPROACH_EXPANSIONS: usize = 5_000;
@@ -108,14 +111,28 @@ impl GuidedPlanner {
         if !problem.collision.pose_is_free(pose) {
             return None;
         }
-        let before = *left;
-        let Leg { mut path, .. } =
-            self.hars.leg(problem, problem.start, &GoalSet::single(pose), left).ok()?;
-        let goal = self.hars.goal_set_of_cell(problem, found.shift);
-        let second = self.hars.leg(problem, pose, &goal, left).ok()?;
-        path.extend(second.path.segments);
-        let route = if *left == before { Route::Direct } else { Route::Searched };
+        let share = (*left).min(LEG_EXPANSIONS);
+        let mut spend = share;
+        let path = self.two_legs(problem, pose, found.shift, &mut spend);
+        *left -= share - spend;
+        let route = if spend == share { Route::Direct } else { Route::Searched };
+        let path = path?;
         Some((path, Guidance { abstraction: Some(found), preparatory: Some(pose), route }))
+    }
+
+    /// From the start to `pose` and from there to the goal of the cell.
+    fn two_legs(
+        &mut self,
+        problem: &Problem,
+        pose: Pose,
+        shift: f64,
+        left: &mut usize,
+    ) -> Option<Path> {
+        let single = GoalSet::single(pose);
+        let Leg { mut path, .. } = self.hars.leg(problem, problem.start, &single, left).ok()?;
+        let goal = self.hars.goal_set_of_cell(problem, shift);
+        path.extend(self.hars.leg(problem, pose, &goal, left).ok()?.path.segments);
+        Some(path)
     }
 
     fn plan_ranked(

@@ -1,13 +1,15 @@
 //! Samples → one network of a parking type.
 //!
-//! The network learns `Features → (x, y, cos θ, sin θ)` of the preparatory pose from solved
-//! samples, both sides normalised. Whole cells are kept for validation, so that the loss
+//! The network learns `Features → (x, y, cos θ, sin θ)` of a preparatory pose from solved
+//! samples, both sides normalised; which pose, [`super::Targets`] says. Whole cells are kept for validation, so that the loss
 //! measured is that of environments never seen. Whenever it improves the model file is
 //! replaced, so an interrupted training leaves the best network so far.
 //!
 //! The same samples, settings and seed give the same bytes: initial weights, order of rows
 //! and validation cells come from [`crate::rng`].
 
+use std::collections::BTreeSet;
+use std::num::NonZero;
 use std::path::{Path, PathBuf};
 
 use candle_core::{DType, Device, Tensor, Var};
@@ -17,9 +19,10 @@ use serde::{Deserialize, Serialize};
 
 use super::curve::{self, EpochLoss};
 use super::optimiser::AdamW;
-use super::{Loss, MlpConfig, TrainingError, solved};
+use super::targets::{self, Example};
+use super::{Loss, MlpConfig, TrainingError, Validation, solved};
 use crate::dataset::{Metadata, Sample, validation_cells};
-use crate::geometry::signed_angle;
+use crate::geometry::{Pose, signed_angle};
 use crate::progress;
 use crate::rng::{Stream, rng};
 use crate::selectors::artefact;
@@ -33,7 +36,7 @@ use crate::world::ParkingType;
 /// Fewest solved samples worth training on.
 const LEAST_SAMPLES: usize = 10;
 
-/// How far predictions lie from the stored preparatory poses of the validation rows.
+/// How far predictions lie from the preparatory poses wanted in the validation rows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Errors {
     /// Mean distance, metres.
@@ -49,6 +52,8 @@ pub struct Errors {
     /// 95th percentile of the difference of the headings, radians.
     pub heading_p95_rad: f64,
 }
+
+pub use super::targets::Reach;
 
 /// The training's log, written as JSON beside the model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -69,6 +74,8 @@ pub struct TrainingLog {
     pub best_epoch: usize,
     /// Errors of the stored network on the validation rows.
     pub validation: Errors,
+    /// What its predictions for validation rows are worth to a planner.
+    pub reach: Reach,
 }
 
 /// Trains a network of `kind` and writes it to `out`, with `.training.json` and
@@ -90,9 +97,10 @@ pub fn train(
         let (samples, needed) = (solved.len(), LEAST_SAMPLES);
         return Err(TrainingError::TooFew { kind, samples, needed });
     }
-    let (train, validation) = split(&solved, config);
-    let raw_inputs: Vec<_> = train.iter().map(|s| features(s)).collect();
-    let raw_outputs: Vec<_> = train.iter().map(|s| outputs_from_pose(s.rs_start)).collect();
+    let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
+    let (train, validation) = split(targets::examples(metadata, &solved, config, threads), config);
+    let raw_inputs: Vec<_> = train.iter().map(features).collect();
+    let raw_outputs: Vec<_> = train.iter().map(|e| outputs_from_pose(e.target)).collect();
     let header = MlpHeader {
         format_version: mlp::VERSION,
         kind,
@@ -112,6 +120,7 @@ pub fn train(
     let model = Trainable::new(config.seed)?;
     let mut optimiser = AdamW::new(&model.vars, config.weight_decay)?;
 
+    let first = predictions(&model, &validation_rows, &header)?;
     let mut log = TrainingLog {
         kind,
         config: config.clone(),
@@ -120,7 +129,8 @@ pub fn train(
         validation_rows: validation_rows.len(),
         losses: Vec::new(),
         best_epoch: 0,
-        validation: errors(&model, &validation, &validation_rows, &header)?,
+        validation: errors(&first, &validation),
+        reach: targets::reach(metadata, &validation, &first),
     };
     let mut best = f32::INFINITY;
     let mut order: Vec<usize> = (0..train.len()).collect();
@@ -140,13 +150,16 @@ pub fn train(
         if loss.validation < best {
             best = loss.validation;
             log.best_epoch = epoch + 1;
-            log.validation = errors(&model, &validation, &validation_rows, &header)?;
+            let predicted = predictions(&model, &validation_rows, &header)?;
+            log.validation = errors(&predicted, &validation);
+            log.reach = targets::reach(metadata, &validation, &predicted);
             artefact::write(out, &mlp::encode(&header, &model.weights()?))?;
             write_log(&log, out)?;
         }
-        let median = log.validation.position_median_m;
+        let (median, direct) = (log.validation.position_median_m, 100.0 * log.reach.direct);
         bar.set_message(format!(
-            "loss {:.4} validation {:.4} best {best:.4} (epoch {}, median {median:.2} m)",
+            "loss {:.4} validation {:.4} best {best:.4} (epoch {}, median {median:.2} m, \
+             direct {direct:.0} %)",
             loss.train, loss.validation, log.best_epoch
         ));
         bar.inc(1);
@@ -172,20 +185,20 @@ fn write_log(log: &TrainingLog, out: &Path) -> Result<(), TrainingError> {
     Ok(artefact::write(&log_path(out), text.as_bytes())?)
 }
 
-fn features(sample: &Sample) -> [f32; Features::COUNT] {
-    Features::new(sample.start, sample.cell).values()
+fn features(example: &Example) -> [f32; Features::COUNT] {
+    Features::new(example.start, example.cell).values()
 }
 
-/// Training and validation samples: whole cells validate, at least one. Where there is one
-/// cell only, single samples of it do.
-fn split<'a>(solved: &[&'a Sample], config: &MlpConfig) -> (Vec<&'a Sample>, Vec<&'a Sample>) {
-    let one_cell = solved[0].cell_index == solved[solved.len() - 1].cell_index;
-    let unit = |s: &Sample| if one_cell { s.sample_index } else { s.cell_index };
-    let mut units: Vec<u32> = solved.iter().map(|s| unit(s)).collect();
-    units.dedup();
+/// Training and validation rows. Sample indices validate, the same in every cell, or whole
+/// cells; at least one, and where there is one cell only, single rows of it do.
+fn split(all: Vec<Example>, config: &MlpConfig) -> (Vec<Example>, Vec<Example>) {
+    let one_cell = all[0].cell_index == all[all.len() - 1].cell_index;
+    let starts = one_cell || config.validation == Validation::Starts;
+    let unit = |e: &Example| if starts { e.sample_index } else { e.cell_index };
+    let units: BTreeSet<u32> = all.iter().map(unit).collect();
     let share = config.validation_share.max(1.0 / units.len() as f64);
     let kept = validation_cells(units, share, config.seed);
-    solved.iter().partition(|s| !kept.contains(&unit(s)))
+    all.into_iter().partition(|e| !kept.contains(&unit(e)))
 }
 
 /// Normalised rows, ready to be gathered into batches.
@@ -195,10 +208,9 @@ struct Rows {
 }
 
 impl Rows {
-    fn new(samples: &[&Sample], header: &MlpHeader) -> Self {
-        let inputs = samples.iter().map(|s| header.input.normalise(features(s)));
-        let outputs =
-            samples.iter().map(|s| header.output.normalise(outputs_from_pose(s.rs_start)));
+    fn new(examples: &[Example], header: &MlpHeader) -> Self {
+        let inputs = examples.iter().map(|e| header.input.normalise(features(e)));
+        let outputs = examples.iter().map(|e| header.output.normalise(outputs_from_pose(e.target)));
         Self { inputs: inputs.collect(), outputs: outputs.collect() }
     }
 
@@ -327,12 +339,12 @@ fn validation_loss(
     Ok(total / rows.len() as f32)
 }
 
-fn errors(
+/// The network's poses for all rows.
+fn predictions(
     model: &Trainable,
-    samples: &[&Sample],
     rows: &Rows,
     header: &MlpHeader,
-) -> Result<Errors, TrainingError> {
+) -> Result<Vec<Pose>, TrainingError> {
     let mut predicted = Vec::new();
     evaluate(model, rows, |values, _| {
         for row in values.to_vec2::<f32>()? {
@@ -341,20 +353,24 @@ fn errors(
         }
         Ok(())
     })?;
-    let pairs = || predicted.iter().zip(samples);
-    let mut positions: Vec<f64> = pairs().map(|(p, s)| p.distance(s.rs_start)).collect();
+    Ok(predicted)
+}
+
+fn errors(predicted: &[Pose], examples: &[Example]) -> Errors {
+    let pairs = || predicted.iter().zip(examples);
+    let mut positions: Vec<f64> = pairs().map(|(p, e)| p.distance(e.target)).collect();
     let mut headings: Vec<f64> =
-        pairs().map(|(p, s)| signed_angle(p.heading, s.rs_start.heading).abs()).collect();
+        pairs().map(|(p, e)| signed_angle(p.heading, e.target.heading).abs()).collect();
     positions.sort_by(f64::total_cmp);
     headings.sort_by(f64::total_cmp);
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
     let quantile = |v: &[f64], q: f64| v[((v.len() - 1) as f64 * q).round() as usize];
-    Ok(Errors {
+    Errors {
         position_mean_m: mean(&positions),
         position_median_m: quantile(&positions, 0.5),
         position_p95_m: quantile(&positions, 0.95),
         heading_mean_rad: mean(&headings),
         heading_median_rad: quantile(&headings, 0.5),
         heading_p95_rad: quantile(&headings, 0.95),
-    })
+    }
 }

@@ -28,6 +28,26 @@ pub enum Schedule {
     Step,
 }
 
+/// Which preparatory pose is learnt for a start.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Targets {
+    /// The sample's own.
+    Stored,
+    /// One for all starts of the cell, chosen for short paths and little search.
+    PerCell,
+}
+
+/// What is kept from training to validate with.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Validation {
+    /// Some starts in every cell: what planning asks, for its cells are those of the grid.
+    Starts,
+    /// Whole cells: how well the network carries over to environments never seen.
+    Cells,
+}
+
 /// Settings of the training. The network itself is the paper's and fixed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -48,7 +68,14 @@ pub struct MlpConfig {
     pub huber_delta: f64,
     /// Epochs without a better validation loss after which training ends.
     pub patience: usize,
-    /// Share of the cells kept for validation.
+    /// Which preparatory pose is learnt.
+    pub targets: Targets,
+    /// With one target per cell: every other row starts behind the cell's lane, up to this
+    /// far, metres; 0 for none.
+    pub behind: f64,
+    /// What is kept for validation.
+    pub validation: Validation,
+    /// Share of the starts or cells kept for validation.
     pub validation_share: f64,
     /// Seed of initial weights, shuffling and validation cells.
     pub seed: u64,
@@ -65,6 +92,9 @@ impl Default for MlpConfig {
             loss: Loss::Huber,
             huber_delta: 0.1,
             patience: 20,
+            targets: Targets::PerCell,
+            behind: 8.0,
+            validation: Validation::Starts,
             validation_share: 0.1,
             seed: 1,
         }
@@ -99,6 +129,7 @@ impl MlpConfig {
         real("learning_rate", self.learning_rate, 1e-8..=1.0, "a number from 1e-8 to 1")?;
         real("weight_decay", self.weight_decay, 0.0..=1.0, "a number from 0 to 1")?;
         real("huber_delta", self.huber_delta, 1e-4..=100.0, "a number from 1e-4 to 100")?;
+        real("behind", self.behind, 0.0..=100.0, "a number from 0 to 100")?;
         real("validation_share", self.validation_share, 0.01..=0.5, "a number from 0.01 to 0.5")
     }
 

@@ -10,8 +10,9 @@ pub mod library;
 pub mod mlp;
 mod mlp_config;
 pub mod optimiser;
+mod targets;
 
-pub use mlp_config::{Loss, MlpConfig, Schedule};
+pub use mlp_config::{Loss, MlpConfig, Schedule, Targets, Validation};
 
 use crate::dataset::{Sample, Status};
 use crate::files::TomlError;
