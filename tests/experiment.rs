@@ -52,9 +52,12 @@ fn runs_goes_on_and_reproduces() {
     std::fs::write(dir.path().join("tiny.toml"), TINY).unwrap();
     experiment(dir.path(), &["run", "tiny.toml"]).success().stdout(contains("rows"));
     let results = dir.path().join("results/tiny");
-    for file in ["config.toml", "run.json", "rows.parquet", "report.md", "models/knn.bin"] {
+    let files = ["config.toml", "run.json", "rows.parquet", "report.md", "report.html"];
+    for file in files.into_iter().chain(["models/knn.bin"]) {
         assert!(results.join(file).exists(), "{file}");
     }
+    let traces = std::fs::read_to_string(results.join("traces.jsonl")).unwrap();
+    assert_eq!(traces.lines().count(), 2 * 3 * 4);
     let rows_csv = results.join("rows.csv");
     let rows = untimed(&rows_csv);
     assert_eq!(rows.len(), 2 * 3 * 4);
@@ -73,8 +76,12 @@ fn runs_goes_on_and_reproduces() {
     let stage = results.join("stages/evaluate.json");
     let record = std::fs::read_to_string(&stage).unwrap();
     std::fs::write(&stage, record.replace("true", "false")).unwrap();
+    std::fs::remove_file(results.join("report.html")).unwrap();
     experiment(dir.path(), &["run", "tiny.toml"]).success();
     assert_eq!(untimed(&rows_csv), rows);
+    // The paths of all rows, too, so that the report is complete.
+    assert_eq!(std::fs::read_to_string(results.join("traces.jsonl")).unwrap(), traces);
+    assert!(results.join("report.html").exists());
     let kept = half.iter().rposition(|b| *b == b'\n').unwrap();
     assert_eq!(std::fs::read(&rows_csv).unwrap()[..kept], half[..kept], "rows done are kept");
 

@@ -42,7 +42,7 @@ struct Args {
     /// Write each path to DIR/SCENE.METHOD.json.
     #[arg(long, value_name = "DIR")]
     paths: Option<PathBuf>,
-    /// Write rows.csv, rows.parquet and report.md to this folder.
+    /// Write rows (CSV, Parquet) and reports (Markdown, HTML) to this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print rows and summaries as JSON instead of tables.
@@ -80,12 +80,12 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
     let rows = suite::run(&cases, &models, &config, 0, |case, episode| {
         bar.set_message(format!("{} {}", episode.row.method, episode.row.scene));
         bar.inc(1);
-        outputs.take(case, episode).map_err(anyhow::Error::from)
+        outputs.take(case, episode, &models).map_err(anyhow::Error::from)
     })?;
     bar.finish_and_clear();
 
     let provenance = Provenance::here(scenes, args.seed, args.max_expansions, args.threads.into());
-    outputs.finish("Evaluation", &rows, &provenance)?;
+    outputs.finish("Evaluation", &cases, &rows, &provenance)?;
     if args.json {
         let groups = metrics::summarise(&rows, args.seed);
         let all = serde_json::json!({"provenance": provenance, "rows": rows, "groups": groups});

@@ -64,7 +64,10 @@ fn run(file: &Path, out: Option<&Path>) -> Result<ExitCode> {
     let out = out.map_or_else(|| results(file, &config), Path::to_owned);
     let rows = runner::run(&config, &out).map_err(exit_code)?;
     cli::print(report::text(&rows, config.evaluate.seed).trim_end())?;
-    cli::print(format!("{}: config, data set, models, rows and report.md", out.display()))?;
+    cli::print(format!(
+        "{}: config, data set, models, rows; start with report.html",
+        out.display()
+    ))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -8,9 +8,8 @@ use anyhow::Result;
 use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::evaluation::draw::{Drawing, scene_svg};
-use n3p::evaluation::{Case, Episode, EpisodeConfig, Method, Models, episode};
+use n3p::evaluation::{Case, Episode, EpisodeConfig, Method, Models, episode, trace};
 use n3p::files::{check_writable, reason, write_whole};
-use n3p::geometry::{Polygon, Pose};
 use n3p::planners::{HybridAStarConfig, Problem};
 use n3p::world::Scene;
 
@@ -144,18 +143,11 @@ fn summary(episode: &Episode) -> String {
 fn picture(scene: &Scene, episode: &Episode, method: Method, models: &Models) -> String {
     let frame = &episode.problem.frame;
     let path = episode.result.outcome.as_ref().ok().map(|p| p.to_world(frame));
-    let guidance = episode.result.guidance.as_ref();
-    let selector = models.selector(method);
-    let regions = guidance.and_then(|g| g.abstraction).zip(selector).map(|(found, selector)| {
-        found.regions(selector.grid()).map(|region| {
-            Polygon::rectangle(Pose::default(), region).map(|v| frame.world_from_local_point(v))
-        })
-    });
-    let preparatory = guidance.and_then(|g| g.preparatory);
+    let preparatory = episode.result.guidance.as_ref().and_then(|g| g.preparatory);
     let drawing = Drawing {
         method: Some(method.name()),
         path: path.as_ref(),
-        regions,
+        regions: trace::regions(episode, models),
         preparatory: preparatory.map(|p| frame.world_from_local(p)),
         note: Some(episode.row.reason.as_str()).filter(|r| !r.is_empty()),
     };

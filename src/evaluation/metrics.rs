@@ -86,6 +86,65 @@ pub struct Group {
     pub summaries: Vec<Summary>,
 }
 
+/// One method over all scenes of a run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Totals {
+    /// Name of the method.
+    pub method: String,
+    /// Scenes it applies to.
+    pub scenes: usize,
+    /// Those with an accepted path.
+    pub solved: usize,
+    /// Those whose path the independent check refused.
+    pub rejected: usize,
+    /// Those that a guided planner had to search the whole way.
+    pub fallbacks: usize,
+    /// Scenes it does not apply to.
+    pub not_applicable: usize,
+    /// Median time, seconds; `None` where it applies nowhere.
+    pub median_t_s: Option<f64>,
+    /// Mean length of the solved paths, metres.
+    pub mean_length_m: Option<f64>,
+    /// Their mean number of direction changes.
+    pub mean_direction_changes: Option<f64>,
+    /// Mean expansions.
+    pub mean_nodes: Option<f64>,
+}
+
+/// The totals of every method, in the order of their first rows.
+pub fn totals(rows: &[Row]) -> Vec<Totals> {
+    let mut methods: Vec<(&str, Vec<&Row>)> = Vec::new();
+    let mut places: HashMap<&str, usize> = HashMap::new();
+    for row in rows {
+        let place = *places.entry(&row.method).or_insert(methods.len());
+        if place == methods.len() {
+            methods.push((&row.method, Vec::new()));
+        }
+        methods[place].1.push(row);
+    }
+    methods.into_iter().map(|(method, rows)| total(method, &rows)).collect()
+}
+
+fn total(method: &str, all: &[&Row]) -> Totals {
+    let rows: Vec<&Row> = all.iter().copied().filter(|r| r.applies()).collect();
+    let count = |is: fn(&Row) -> bool| rows.iter().filter(|r| is(r)).count();
+    let solved = || rows.iter().filter(|r| r.ok);
+    let mut times: Vec<f64> = rows.iter().map(|r| r.plan_time_s).collect();
+    times.sort_by(f64::total_cmp);
+    Totals {
+        method: method.to_owned(),
+        scenes: rows.len(),
+        solved: count(|r| r.ok),
+        rejected: count(Row::is_rejected),
+        fallbacks: count(|r| r.fallback),
+        not_applicable: all.len() - rows.len(),
+        median_t_s: (!times.is_empty()).then(|| percentile(&times, 0.5)),
+        mean_length_m: mean(solved().filter_map(|r| r.length_m)),
+        mean_direction_changes: mean(solved().filter_map(|r| r.direction_changes).map(f64::from)),
+        mean_nodes: mean(rows.iter().map(|r| f64::from(r.nodes))),
+    }
+}
+
 /// Summarises the `rows` whose method applies to their scene by level (hardest last) and
 /// type. `seed` drives the resampling.
 pub fn summarise(rows: &[Row], seed: u64) -> Vec<Group> {
@@ -208,7 +267,7 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 /// The `q` quantile of sorted values, linear between ranks.
-fn percentile(sorted: &[f64], q: f64) -> f64 {
+pub(super) fn percentile(sorted: &[f64], q: f64) -> f64 {
     let at = q * (sorted.len() - 1) as f64;
     let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
     low + (high - low) * at.fract()

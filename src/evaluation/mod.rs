@@ -3,12 +3,14 @@
 //! Reading order: a [`Method`] is built from [`Models`]; [`episode`] runs one method on
 //! one scene, exports the path ([`export`]) and has it checked by the independent
 //! [`oracle`]; [`suite`] does so for all; [`rows`] are saved; [`metrics`] summarises them,
-//! [`table`] lays them out beside the paper's, [`report`] writes them down. [`draw`] makes
-//! pictures of scenes and paths.
+//! [`table`] lays them out beside the paper's, [`report`] writes them down, and [`html`] with
+//! plots and a gallery of the paths that [`trace`] kept. [`draw`] makes pictures of scenes and
+//! paths.
 
 pub mod draw;
 pub mod episode;
 pub mod export;
+pub mod html;
 mod method;
 pub mod metrics;
 mod models;
@@ -18,6 +20,7 @@ pub mod report;
 pub mod rows;
 pub mod suite;
 pub mod table;
+pub mod trace;
 
 pub use episode::{Case, Episode, EpisodeConfig};
 pub use export::{PathFile, PathFileError};

@@ -1,20 +1,26 @@
 //! Where a run's results go: rows as they come, tables and reports at the end.
 
+use std::collections::HashSet;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use super::episode::{Case, Episode};
 use super::export::{PathFile, PathFileError};
+use super::html;
+use super::models::Models;
 use super::report::{self, Provenance};
 use super::rows::{self, Row, RowWriter, RowsError};
+use super::trace::{self, Trace, TraceWriter};
 use crate::files::{reason, remove_leftovers, write_whole};
 
 /// The folders of a run; either may be absent.
 pub struct Outputs {
     out: Option<PathBuf>,
     paths: Option<PathBuf>,
-    writer: Option<RowWriter>,
+    writers: Option<(TraceWriter, RowWriter)>,
 }
+
+const TRACES: &str = "traces.jsonl";
 
 /// Results that cannot be saved.
 #[derive(Debug, thiserror::Error)]
@@ -33,9 +39,9 @@ pub enum OutputError {
     /// A path file cannot be written.
     #[error(transparent)]
     Path(#[from] PathFileError),
-    /// The report cannot be written.
+    /// Traces or a report cannot be written, or traces not read back.
     #[error("{path}: {}", reason(error))]
-    Report {
+    File {
         /// The file.
         path: PathBuf,
         /// The operating system's reason.
@@ -44,30 +50,51 @@ pub enum OutputError {
 }
 
 impl Outputs {
-    /// Makes the folders, removes what killed runs left in them and begins `OUT/rows.csv`.
+    /// Makes the folders, removes what killed runs left in them and begins `OUT/rows.csv`
+    /// and `OUT/traces.jsonl`.
     pub fn create(out: Option<&Path>, paths: Option<&Path>) -> Result<Self, OutputError> {
         for path in out.into_iter().chain(paths) {
             std::fs::create_dir_all(path)
                 .and_then(|()| remove_leftovers(path))
                 .map_err(|error| OutputError::Folder { path: path.to_owned(), error })?;
         }
-        let writer = out.map(|dir| RowWriter::create(&dir.join("rows.csv"))).transpose()?;
-        Ok(Self { out: out.map(Path::to_owned), paths: paths.map(Path::to_owned), writer })
+        let begin = |dir: &Path| -> Result<_, OutputError> {
+            let path = dir.join(TRACES);
+            let traces = TraceWriter::create(&path);
+            let traces = traces.map_err(|error| OutputError::File { path, error })?;
+            Ok((traces, RowWriter::create(&dir.join("rows.csv"))?))
+        };
+        let writers = out.map(begin).transpose()?;
+        Ok(Self { out: out.map(Path::to_owned), paths: paths.map(Path::to_owned), writers })
     }
 
-    /// As [`Outputs::create`] for `out`, keeping the rows that an interrupted run left.
+    /// As [`Outputs::create`] for `out`, keeping the rows that an interrupted run left, and
+    /// their traces.
     pub fn resume(out: &Path) -> Result<(Self, Vec<Row>), OutputError> {
-        let file = out.join("rows.csv");
+        let (file, traces) = (out.join("rows.csv"), out.join(TRACES));
         let done = if file.exists() { rows::read_csv(&file)? } else { Vec::new() };
+        let scenes: HashSet<&str> = done.iter().map(|r| r.scene.as_str()).collect();
+        let keys: HashSet<_> = done.iter().map(Row::key).collect();
+        let mut traces = trace::read(&traces, &scenes)
+            .map_err(|error| OutputError::File { path: traces, error })?;
+        traces.retain(|t| keys.contains(&t.key()));
         let mut outputs = Self::create(Some(out), None)?;
-        for row in &done {
-            outputs.push(row)?;
-        }
+        traces.iter().try_for_each(|t| outputs.push_trace(t))?;
+        done.iter().try_for_each(|row| outputs.push(row))?;
         Ok((outputs, done))
     }
 
-    /// Saves one episode: its row, and its path where paths are wanted.
-    pub fn take(&mut self, case: &Case, episode: &Episode) -> Result<(), OutputError> {
+    /// Saves one episode, whose method was built from `models`: its trace, its row, and its
+    /// path where paths are wanted.
+    pub fn take(
+        &mut self,
+        case: &Case,
+        episode: &Episode,
+        models: &Models,
+    ) -> Result<(), OutputError> {
+        if self.writers.is_some() {
+            self.push_trace(&Trace::new(episode, models))?;
+        }
         self.push(&episode.row)?;
         if let (Some(dir), Some(path)) = (&self.paths, &episode.path) {
             path.write(&dir.join(PathFile::file_name(&case.scene, &episode.row.method)))?;
@@ -76,23 +103,42 @@ impl Outputs {
     }
 
     fn push(&mut self, row: &Row) -> Result<(), OutputError> {
-        if let Some(writer) = &mut self.writer {
-            writer.push(row)?;
+        if let Some((_, rows)) = &mut self.writers {
+            rows.push(row)?;
         }
         Ok(())
     }
 
-    /// Writes `rows.parquet` and `report.md`, where an output folder is wanted.
+    fn push_trace(&mut self, trace: &Trace) -> Result<(), OutputError> {
+        if let (Some((traces, _)), Some(dir)) = (&mut self.writers, &self.out) {
+            traces
+                .push(trace)
+                .map_err(|error| OutputError::File { path: dir.join(TRACES), error })?;
+        }
+        Ok(())
+    }
+
+    /// Writes `rows.parquet`, `report.md` and `report.html`, where an output folder is wanted.
+    /// `cases` are the scenes of `rows`.
     pub fn finish(
         self,
         title: &str,
+        cases: &[Case],
         rows: &[Row],
         provenance: &Provenance,
     ) -> Result<(), OutputError> {
         let Some(dir) = self.out else { return Ok(()) };
         rows::write_parquet(&dir.join("rows.parquet"), rows)?;
-        let path = dir.join("report.md");
-        write_whole(&path, report::markdown(title, rows, provenance).as_bytes())
-            .map_err(|error| OutputError::Report { path, error })
+        let write = |name: &str, text: String| {
+            let path = dir.join(name);
+            write_whole(&path, text.as_bytes()).map_err(|error| OutputError::File { path, error })
+        };
+        write("report.md", report::markdown(title, rows, provenance))?;
+        let shown = html::gallery::chosen(cases, rows);
+        let scenes = shown.iter().map(|c| c.scene.name.as_str()).collect();
+        let path = dir.join(TRACES);
+        let traces =
+            trace::read(&path, &scenes).map_err(|error| OutputError::File { path, error })?;
+        write("report.html", html::page(title, rows, provenance, &shown, &traces))
     }
 }

@@ -5,7 +5,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::Serialize;
 
-use super::metrics::{self, Group};
+use super::metrics;
 use super::rows::Row;
 use super::table;
 use crate::dataset::schema::GIT_REVISION;
@@ -56,6 +56,21 @@ impl Provenance {
     }
 }
 
+impl Provenance {
+    /// Everything but the command, named, for people.
+    pub fn facts(&self) -> [(&'static str, String); 7] {
+        [
+            ("Date (UTC)", self.date.clone()),
+            ("Machine", format!("{}, {} logical cores", self.processor, self.cores)),
+            ("Threads", self.threads.to_string()),
+            ("Version", format!("n3p {}, revision {}", self.crate_version, self.git_revision)),
+            ("Scenes", self.scenes.clone()),
+            ("Seed of the intervals", self.seed.to_string()),
+            ("Budget", format!("{} expansions per episode", self.max_expansions)),
+        ]
+    }
+}
+
 /// The tables of a run as plain text, for a terminal.
 pub fn text(rows: &[Row], seed: u64) -> String {
     let groups = metrics::summarise(rows, seed);
@@ -76,28 +91,18 @@ pub fn text(rows: &[Row], seed: u64) -> String {
 
 /// The whole `report.md`.
 pub fn markdown(title: &str, rows: &[Row], provenance: &Provenance) -> String {
-    let p = provenance;
-    let groups = metrics::summarise(rows, p.seed);
-    let mut out = format!("# {title}\n\n");
-    for (name, value) in [
-        ("Command", format!("`{}`", p.command)),
-        ("Date (UTC)", p.date.clone()),
-        ("Machine", format!("{}, {} logical cores", p.processor, p.cores)),
-        ("Threads", p.threads.to_string()),
-        ("Version", format!("n3p {}, revision {}", p.crate_version, p.git_revision)),
-        ("Scenes", p.scenes.clone()),
-        ("Seed of the intervals", p.seed.to_string()),
-        ("Budget", format!("{} expansions per episode", p.max_expansions)),
-    ] {
+    let groups = metrics::summarise(rows, provenance.seed);
+    let mut out = format!("# {title}\n\n- Command: `{}`\n", provenance.command);
+    for (name, value) in provenance.facts() {
         let _ = writeln!(out, "- {name}: {value}");
     }
     out += "\n";
-    out += &headline(&groups, rows);
+    out += &headline(rows);
     for table in table::comparison(&groups) {
         let _ = write!(out, "\n{}", table.markdown());
     }
     let _ = write!(out, "\n{}", table::speed_ups(&groups).markdown());
-    out += NOTES;
+    let _ = write!(out, "\n{NOTES}");
     let failures = table::failures(rows);
     if failures.rows.is_empty() {
         out += "\n## Failures\n\nNone.\n";
@@ -107,7 +112,8 @@ pub fn markdown(title: &str, rows: &[Row], provenance: &Provenance) -> String {
     out
 }
 
-const NOTES: &str = "\n\
+/// How to read the tables: paragraphs of plain text, an empty line between two.
+pub(super) const NOTES: &str = "\
 T runs from the obstacles in hand to the certified path: abstraction, heuristic and \
 inference count, reading files does not. It is the median of up to five runs after a warm-up \
 where a run is cheap, a single run beyond 50 ms. T and N_node are over all scenes, failures \
@@ -120,29 +126,18 @@ ratios, not times. Every path here was accepted by a check written apart from th
 or counts as a failure.\n";
 
 /// One sentence per method, over everything.
-fn headline(groups: &[Group], rows: &[Row]) -> String {
-    let mut methods: Vec<&str> = Vec::new();
-    for summary in groups.iter().flat_map(|g| &g.summaries) {
-        if !methods.contains(&summary.method.as_str()) {
-            methods.push(&summary.method);
-        }
-    }
+fn headline(rows: &[Row]) -> String {
     let mut out = String::new();
-    for method in methods {
-        let (mine, others): (Vec<&Row>, Vec<&Row>) =
-            rows.iter().filter(|r| r.method == method).partition(|r| r.applies());
-        let solved = mine.iter().filter(|r| r.ok).count();
-        let rejected = mine.iter().filter(|r| !r.checked.is_empty() && r.checked != "ok").count();
-        let _ = write!(out, "- `{method}`: {solved} of {} solved", mine.len());
-        if rejected > 0 {
-            let _ = write!(out, ", **{rejected} rejected by the independent check**");
+    for t in metrics::totals(rows) {
+        let _ = write!(out, "- `{}`: {} of {} solved", t.method, t.solved, t.scenes);
+        if t.rejected > 0 {
+            let _ = write!(out, ", **{} rejected by the independent check**", t.rejected);
         }
-        if !others.is_empty() {
-            let _ = write!(out, ", not applicable to {} others", others.len());
+        if t.not_applicable > 0 {
+            let _ = write!(out, ", not applicable to {} others", t.not_applicable);
         }
-        let fallbacks = mine.iter().filter(|r| r.fallback).count();
-        if fallbacks > 0 {
-            let _ = write!(out, ", {fallbacks} by full search");
+        if t.fallbacks > 0 {
+            let _ = write!(out, ", {} by full search", t.fallbacks);
         }
         out += ".\n";
     }

@@ -82,6 +82,20 @@ impl Row {
         self.reason != NoPath::NotApplicable.to_string()
     }
 
+    /// Whether the independent check refused the path.
+    pub fn is_rejected(&self) -> bool {
+        !self.checked.is_empty() && self.checked != "ok"
+    }
+
+    /// Why it failed, with the check's own words; empty when `ok`.
+    pub fn why(&self) -> String {
+        if self.is_rejected() {
+            format!("{}: {}", self.reason, self.checked)
+        } else {
+            self.reason.clone()
+        }
+    }
+
     /// Scene and method, which no two rows of a run share.
     pub fn key(&self) -> (&str, &str) {
         (&self.scene, &self.method)

@@ -39,7 +39,7 @@ pub struct PaperRow {
 
 impl PaperRow {
     /// The cells with times in milliseconds, as in our tables.
-    fn in_milliseconds(&self) -> [String; 10] {
+    pub fn in_milliseconds(&self) -> [String; 10] {
         let mut cells = self.cells.clone();
         for time in &mut cells[..4] {
             let seconds: f64 = time.parse().expect("a number in the embedded table");
@@ -66,6 +66,17 @@ pub fn paper_rows() -> Vec<PaperRow> {
         .collect()
 }
 
+/// The paper's line for our `method`, if it has one.
+pub(super) fn printed<'p>(
+    paper: &'p [PaperRow],
+    level: Option<Level>,
+    kind: Option<ParkingType>,
+    method: &str,
+) -> Option<&'p PaperRow> {
+    let name = method.parse().ok().and_then(Method::paper_name)?;
+    paper.iter().find(|p| Some(p.level) == level && Some(p.kind) == kind && p.method == name)
+}
+
 /// One table per level: each method's line, and under it the paper's where it has one.
 pub fn comparison(groups: &[Group]) -> Vec<Table> {
     let paper = paper_rows();
@@ -76,13 +87,7 @@ pub fn comparison(groups: &[Group]) -> Vec<Table> {
             for s in &group.summaries {
                 let cells = numbers(s);
                 rows.push(line(group.kind, &s.method, "this run", cells));
-                let name = s.method.parse().ok().and_then(Method::paper_name);
-                let printed = paper.iter().find(|p| {
-                    Some(p.level) == level
-                        && Some(p.kind) == group.kind
-                        && Some(p.method.as_str()) == name
-                });
-                if let Some(p) = printed {
+                if let Some(p) = printed(&paper, level, group.kind, &s.method) {
                     rows.push(line(group.kind, &p.method, "paper", p.in_milliseconds()));
                 }
             }
@@ -156,14 +161,8 @@ pub fn speed_ups(groups: &[Group]) -> Table {
 
 /// Every row that failed, with its reason. A method that does not apply has not failed.
 pub fn failures(rows: &[Row]) -> Table {
-    let failed = rows.iter().filter(|r| !r.ok && r.applies()).map(|r| {
-        let why = if r.checked.is_empty() || r.checked == "ok" {
-            r.reason.clone()
-        } else {
-            format!("{}: {}", r.reason, r.checked)
-        };
-        vec![r.scene.clone(), r.method.clone(), why]
-    });
+    let failed = rows.iter().filter(|r| !r.ok && r.applies());
+    let failed = failed.map(|r| vec![r.scene.clone(), r.method.clone(), r.why()]);
     Table {
         title: "Failures".to_owned(),
         headers: ["scene", "method", "reason"].map(str::to_owned).to_vec(),
@@ -172,17 +171,17 @@ pub fn failures(rows: &[Row]) -> Table {
     }
 }
 
-fn levels(groups: &[Group]) -> Vec<Option<Level>> {
+pub(super) fn levels(groups: &[Group]) -> Vec<Option<Level>> {
     let mut levels: Vec<_> = groups.iter().map(|g| g.level).collect();
     levels.dedup();
     levels
 }
 
-fn level_title(level: Option<Level>) -> String {
+pub(super) fn level_title(level: Option<Level>) -> String {
     level.map_or("Scenes from files".to_owned(), |l| format!("Level {l}"))
 }
 
-fn kind_name(kind: Option<ParkingType>) -> String {
+pub(super) fn kind_name(kind: Option<ParkingType>) -> String {
     kind.map_or("–".to_owned(), |k| k.to_string())
 }
 
@@ -190,7 +189,7 @@ fn line(kind: Option<ParkingType>, method: &str, source: &str, cells: [String; 1
     [kind_name(kind), method.to_owned(), source.to_owned()].into_iter().chain(cells).collect()
 }
 
-fn numbers(s: &Summary) -> [String; 10] {
+pub(super) fn numbers(s: &Summary) -> [String; 10] {
     let maybe = |v: Option<f64>, digits| v.map_or("–".to_owned(), |v| format!("{v:.digits$}"));
     [
         figures(s.min_t_s * 1e3),
@@ -207,7 +206,7 @@ fn numbers(s: &Summary) -> [String; 10] {
 }
 
 /// Four significant figures.
-fn figures(v: f64) -> String {
+pub(super) fn figures(v: f64) -> String {
     if v == 0.0 || !v.is_finite() {
         return v.to_string();
     }
@@ -215,7 +214,7 @@ fn figures(v: f64) -> String {
     format!("{v:.digits$}")
 }
 
-fn span(i: Interval) -> String {
+pub(super) fn span(i: Interval) -> String {
     format!("{} … {}", figures(i.low), figures(i.high))
 }
 

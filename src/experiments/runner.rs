@@ -7,7 +7,8 @@
 //! | `config.toml`, `run.json` | every setting spelt out; the build; written first |
 //! | `dataset/` | the samples |
 //! | `models/` | `knn.bin`, `mlp-TYPE.safetensors` |
-//! | `rows.csv`, `rows.parquet`, `report.md` | the evaluation |
+//! | `rows.csv`, `rows.parquet`, `report.md`, `report.html` | the evaluation |
+//! | `traces.jsonl` | its paths, for the report |
 //! | `stages/` | which stage was begun or finished, from which settings |
 //!
 //! A finished stage is skipped when its settings, and those of the stages it builds on, are
@@ -303,7 +304,7 @@ impl Runner<'_> {
         bar.set_position(rows.len() as u64);
         let new = suite::run(&cases, &models, &suite_config, rows.len(), |case, episode| {
             bar.inc(1);
-            outputs.take(case, episode).map_err(ExperimentError::from)
+            outputs.take(case, episode, &models).map_err(ExperimentError::from)
         })?;
         bar.finish_and_clear();
         rows.extend(new);
@@ -316,7 +317,7 @@ impl Runner<'_> {
         );
         let provenance = Provenance::here(scenes, e.seed, e.max_expansions, 1);
         let title = format!("Experiment {}", self.config.name);
-        outputs.finish(&title, &rows, &provenance)?;
+        outputs.finish(&title, &cases, &rows, &provenance)?;
         self.record("evaluate", &settings, true)?;
         Ok(rows)
     }
