@@ -18,11 +18,13 @@ level != "" && /^\| (forward|parallel|reverse) / {
   if (trim($4) == "this run") failed[level, kind] += trim($11)
 }
 END {
-  print "| level | type | `ha-rs` (HA* with RS) | `mlp-n3p` (MLP-N3P) | `knn-n3p` (KNN-N3P) | `n3p` | failures |"
-  print "|---|---|--:|--:|--:|--:|--:|"
+  print "| level | type | `ha` (HA*) | `ha-rs` (HA* with RS) | `ha-hold` (HA* Hold) | `mhha` (MHHA*) | `sha` (SHA*) " \
+    "| `mlp-n3p` (MLP-N3P) | `knn-n3p` (KNN-N3P) | `n3p` | failures |"
+  print "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|"
   for (i = 1; i <= n; i++) {
     split(order[i], key, SUBSEP); level = key[1]; kind = key[2]
-    printf "| %s | %s | %s | %s | %s | %s | %s |\n", level, kind, cell("ha-rs", "HA* with RS"),
+    printf "| %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s |\n", level, kind, cell("ha", "HA*"),
+      cell("ha-rs", "HA* with RS"), cell("ha-hold", "HA* Hold"), cell("mhha", "MHHA*"), cell("sha", "SHA*"),
       cell("mlp-n3p", "MLP-N3P"), cell("knn-n3p", "KNN-N3P"), cell("n3p", ""),
       failed[level, kind] == 0 ? "none" : failed[level, kind] " %"
   }
