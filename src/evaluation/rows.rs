@@ -51,7 +51,7 @@ pub struct Row {
     pub fallback: bool,
     /// Verdict of the independent check: `ok`, the violation, or empty without a path.
     pub checked: String,
-    /// How a guided planner came to its path: `direct`, `searched`, `fallback`.
+    /// How a guided planner came to its path: `library`, `direct`, `searched`, `fallback`.
     pub route: String,
 }
 

@@ -25,6 +25,7 @@ use super::nonholonomic::NonHolonomic;
 /// Manoeuvres prepared for one footprint and one cost model.
 #[derive(Clone, Debug)]
 pub struct Library {
+    vehicle: Vehicle,
     footprint: Aabb,
     manoeuvres: Vec<Manoeuvre>,
 }
@@ -47,28 +48,28 @@ impl Library {
         footprint: Aabb,
         model: &CostModel,
     ) -> Self {
-        let mut library = Self { footprint, manoeuvres: Vec::new() };
+        let mut library = Self { vehicle: *vehicle, footprint, manoeuvres: Vec::new() };
         for segments in manoeuvres {
-            library.add(segments.clone(), vehicle, model);
+            library.add(segments.clone(), model);
         }
         library
     }
 
     /// Adds one more.
-    pub fn add(&mut self, segments: Vec<Segment>, vehicle: &Vehicle, model: &CostModel) {
+    pub fn add(&mut self, segments: Vec<Segment>, model: &CostModel) {
         let mut pose = Pose::default();
         let mut motions = Vec::new();
         for back in segments.iter().rev().map(|s| s.reversed()) {
             motions.push((BodyFrame::new(pose), Sweep::new(&self.footprint, back)));
             pose = back.end(pose);
         }
-        let entry = Entry::new(pose, segments, true, vehicle, model);
+        let entry = Entry::new(pose, segments, true, &self.vehicle, model);
         self.manoeuvres.push(Manoeuvre { entry, motions });
     }
 
-    /// The footprint it was prepared for.
-    pub fn footprint(&self) -> &Aabb {
-        &self.footprint
+    /// Whether it was prepared for the vehicle and the footprint of `problem`.
+    pub fn fits(&self, problem: &Problem) -> bool {
+        self.vehicle == problem.vehicle && self.footprint == *problem.collision.footprint()
     }
 
     /// Number of manoeuvres.
@@ -155,7 +156,7 @@ impl LibrarySearch {
         model: &CostModel,
         bound: f64,
     ) -> Option<LibraryPlan> {
-        debug_assert_eq!(library.footprint(), problem.collision.footprint());
+        debug_assert!(library.fits(problem));
         self.rank(library, problem, model, bound);
         let base = BodyFrame::new(problem.goal);
         let mut free = std::mem::take(&mut self.free);
@@ -186,7 +187,7 @@ impl LibrarySearch {
 
     /// Fills the queue with all manoeuvres that may cost less than `bound`.
     fn rank(&mut self, library: &Library, problem: &Problem, model: &CostModel, bound: f64) {
-        self.estimate.reset(&problem.vehicle);
+        self.estimate.reset(&problem.vehicle, model);
         let mut queue = std::mem::take(&mut self.queue).into_vec();
         queue.clear();
         let goal = problem.start.relative(problem.goal);

@@ -66,16 +66,19 @@ pub struct PlanResult {
 }
 
 impl PlanResult {
-    /// A result with `path`, which must pass the exact check from the start to the goal:
-    /// the certificate every planner's path leaves with.
+    /// A result with `path`, which must pass the exact check from the start to the goal
+    /// and keep the steering limit: the certificate every planner's path leaves with.
     pub fn certified(problem: &Problem, path: Path, expansions: usize) -> Self {
         /// End poses may differ from the goal by accumulated rounding only.
         const END_TOLERANCE: f64 = 1e-6;
+        /// Stored curvatures are rounded to single precision.
+        const ROUNDING: f64 = 1.0 + 1e-6;
+        let drivable = path.max_abs_curvature() <= problem.vehicle.max_curvature() * ROUNDING;
         let end = path.end();
         let arrives = end.distance(problem.goal) < END_TOLERANCE
             && signed_angle(end.heading, problem.goal.heading).abs() < END_TOLERANCE
             && path.start.distance(problem.start) < END_TOLERANCE;
-        if arrives && problem.collision.path_is_free(&path) {
+        if arrives && drivable && problem.collision.path_is_free(&path) {
             Self { outcome: Ok(path), expansions, guidance: None }
         } else {
             Self::none(NoPath::Uncertified, expansions)
@@ -111,7 +114,8 @@ pub enum NoPath {
 /// What guided planning did: for rows, pictures and explanations.
 #[derive(Clone, Debug)]
 pub struct Guidance {
-    /// The abstraction used; `None` when the scene has no such structure.
+    /// The abstraction found in the scene; `None` when it has no such structure. A plan by
+    /// [`Route::Library`] does not depend on it.
     pub abstraction: Option<Abstraction>,
     /// The preparatory pose driven to, in the problem's frame.
     pub preparatory: Option<Pose>,
@@ -122,7 +126,9 @@ pub struct Guidance {
 /// How guided planning reached its path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Route {
-    /// Reeds-Shepp curves alone: no search at all.
+    /// A curve and a known manoeuvre: no search at all.
+    Library,
+    /// Reeds-Shepp curves alone: no search either.
     Direct,
     /// A search reached the preparatory pose (or left it for the goal).
     Searched,
@@ -134,6 +140,7 @@ impl Route {
     /// The name used in rows.
     pub fn name(self) -> &'static str {
         match self {
+            Route::Library => "library",
             Route::Direct => "direct",
             Route::Searched => "searched",
             Route::Fallback => "fallback",

@@ -25,7 +25,7 @@ struct Bins {
 #[derive(Debug)]
 pub(super) struct NonHolonomic {
     bins: Bins,
-    vehicle: Option<Vehicle>,
+    made_for: Option<(Vehicle, CostModel)>,
     table: Vec<f32>,
     words: Vec<Word>,
 }
@@ -44,14 +44,14 @@ impl NonHolonomic {
     }
 
     fn new(bins: Bins) -> Self {
-        Self { bins, vehicle: None, table: Vec::new(), words: Vec::new() }
+        Self { bins, made_for: None, table: Vec::new(), words: Vec::new() }
     }
 
-    /// Forgets the table when the vehicle is another one.
-    pub fn reset(&mut self, vehicle: &Vehicle) {
-        if self.vehicle.as_ref() != Some(vehicle) {
+    /// Forgets the table when the vehicle or the cost is another one.
+    pub fn reset(&mut self, vehicle: &Vehicle, model: &CostModel) {
+        if self.made_for != Some((*vehicle, *model)) {
             let Bins { half, headings, .. } = self.bins;
-            self.vehicle = Some(*vehicle);
+            self.made_for = Some((*vehicle, *model));
             self.table.clear();
             self.table.resize((2 * half as usize + 1) * (half as usize + 1) * headings, f32::NAN);
         }

@@ -112,7 +112,7 @@ impl Search {
         self.open.clear();
         self.since_curve = 0;
         self.lattice.reset(&domain, resolution.cell, resolution.headings);
-        self.nonholonomic.reset(vehicle);
+        self.nonholonomic.reset(vehicle, &config.cost);
         let radius = inscribed_radius(vehicle);
         let cell = config.cost_to_go_cell;
         self.cost_to_go.reset(&domain, cell, radius, &problem.obstacles, start);

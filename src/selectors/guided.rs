@@ -88,11 +88,11 @@ impl GuidedPlanner {
     fn look_up(&mut self, problem: &Problem) -> Option<LibraryPlan> {
         let kind = problem.kind?;
         let (vehicle, cost) = (&problem.vehicle, &self.hars.config().cost);
-        let footprint = problem.collision.footprint();
-        let fits = |(k, l): &(ParkingType, Library)| *k == kind && l.footprint() == footprint;
+        let fits = |(k, l): &(ParkingType, Library)| *k == kind && l.fits(problem);
         let at = self.libraries.iter().position(fits).unwrap_or_else(|| {
-            let manoeuvres = self.selector.manoeuvres(kind);
-            self.libraries.push((kind, Library::new(&manoeuvres, vehicle, *footprint, cost)));
+            let (manoeuvres, footprint) =
+                (self.selector.manoeuvres(kind), *problem.collision.footprint());
+            self.libraries.push((kind, Library::new(&manoeuvres, vehicle, footprint, cost)));
             self.libraries.len() - 1
         });
         let library = &self.libraries[at].1;
@@ -145,7 +145,7 @@ impl GuidedPlanner {
             let guidance = Guidance {
                 abstraction: found.first().copied(),
                 preparatory: Some(plan.preparatory),
-                route: Route::Direct,
+                route: Route::Library,
             };
             return Ok((plan.path, guidance));
         }

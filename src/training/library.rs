@@ -1,7 +1,7 @@
 //! The few manoeuvres that serve many samples.
 //!
 //! Condensing (P. E. Hart, "The condensed nearest neighbor rule", 1968): sample by sample,
-//! from the tightest cells to the widest, the manoeuvre that ends its path is added to the
+//! from narrow lanes to wide ones, the manoeuvre that ends its path is added to the
 //! library, unless the library already has a plan for the sample that costs hardly more.
 //! Then the samples are planned once more with the whole library, and what hardly any of
 //! them uses, or what is mostly tried in vain, is left out.
@@ -42,7 +42,7 @@ pub(super) fn condense(
     for_each_problem(metadata, kind, &taken, |sample, problem| {
         let Some((manoeuvre, cost)) = ending(&mut hars, metadata, sample, problem) else { return };
         if search.plan(&library, problem, &planner.cost, cost + TOLERANCE).is_none() {
-            library.add(manoeuvre.clone(), vehicle, &planner.cost);
+            library.add(manoeuvre.clone(), &planner.cost);
             manoeuvres.push(manoeuvre);
         }
     });

@@ -1,8 +1,8 @@
 //! Samples → one network of a parking type.
 //!
 //! The network learns `Features → (x, y, cos θ, sin θ)` of a preparatory pose from solved
-//! samples, both sides normalised; which pose, [`super::Targets`] says. Whole cells are kept for validation, so that the loss
-//! measured is that of environments never seen. Whenever it improves the model file is
+//! samples, both sides normalised; which pose, [`super::Targets`] says. Some
+//! starts of every cell are kept for validation, or whole cells ([`super::Validation`]). Whenever it improves the model file is
 //! replaced, so an interrupted training leaves the best network so far.
 //!
 //! The same samples, settings and seed give the same bytes: initial weights, order of rows
@@ -190,10 +190,12 @@ fn features(example: &Example) -> [f32; Features::COUNT] {
 }
 
 /// Training and validation rows. Sample indices validate, the same in every cell, or whole
-/// cells; at least one, and where there is one cell only, single rows of it do.
+/// cells; at least one, and where there is one cell only, single rows of it do (whole cells where
+/// each has one start only).
 fn split(all: Vec<Example>, config: &MlpConfig) -> (Vec<Example>, Vec<Example>) {
     let one_cell = all[0].cell_index == all[all.len() - 1].cell_index;
-    let starts = one_cell || config.validation == Validation::Starts;
+    let one_start = all.iter().all(|e| e.sample_index == all[0].sample_index);
+    let starts = one_cell || (config.validation == Validation::Starts && !one_start);
     let unit = |e: &Example| if starts { e.sample_index } else { e.cell_index };
     let units: BTreeSet<u32> = all.iter().map(unit).collect();
     let share = config.validation_share.max(1.0 / units.len() as f64);

@@ -70,8 +70,8 @@ pub struct MlpConfig {
     pub patience: usize,
     /// Which preparatory pose is learnt.
     pub targets: Targets,
-    /// With one target per cell: every other row starts behind the cell's lane, up to this
-    /// far, metres; 0 for none.
+    /// With one target per cell: every other row gets a new start behind the cell's lane, up to
+    /// this far, metres; 0 leaves all samples theirs.
     pub behind: f64,
     /// What is kept for validation.
     pub validation: Validation,
