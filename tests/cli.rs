@@ -144,7 +144,9 @@ fn a_method_for_other_spots_says_so_and_does_not_fail() {
         .args(["--count", "1", "--methods", "ha-rs,sha", "--out", "out"])
         .assert()
         .success()
-        .stdout(contains("No failures in 12 rows"));
+        .stdout(
+            contains("No failures in 12 rows").and(contains("sha is not applicable to 6 scenes")),
+        );
     let rows = rows::read_csv(&dir.path().join("out/rows.csv")).unwrap();
     assert_eq!(rows.len(), 18, "rows are kept");
     let report = std::fs::read_to_string(dir.path().join("out/report.md")).unwrap();

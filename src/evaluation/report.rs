@@ -86,6 +86,10 @@ pub fn text(rows: &[Row], seed: u64) -> String {
     } else {
         let _ = writeln!(out, "{}", failures.text());
     }
+    for t in metrics::totals(rows).iter().filter(|t| t.not_applicable > 0) {
+        let (name, count) = (&t.method, t.not_applicable);
+        let _ = writeln!(out, "{name} is not applicable to {count} scenes, which are left out.");
+    }
     out
 }
 
