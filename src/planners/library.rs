@@ -109,7 +109,7 @@ pub struct LibraryPlan {
 pub struct LibrarySearch {
     queue: BinaryHeap<Candidate>,
     /// The candidates that are free, in the order they were checked.
-    free: Vec<u32>,
+    free: Vec<Candidate>,
     estimate: NonHolonomic,
     analytic: AnalyticExpansion,
 }
@@ -128,6 +128,14 @@ struct Candidate {
     index: u32,
 }
 
+impl Candidate {
+    /// The cost up to which a plan by this candidate is preferred to the next one's: one more
+    /// change of gear and some steering than estimated.
+    fn window(self) -> f64 {
+        f64::from(self.estimate) + 4.0
+    }
+}
+
 impl Eq for Candidate {}
 
 impl Ord for Candidate {
@@ -143,10 +151,6 @@ impl PartialOrd for Candidate {
 }
 
 impl LibrarySearch {
-    /// A curve may cost this much more than estimated before the next candidate is looked at
-    /// instead: one more change of gear and some steering.
-    const WINDOW: f64 = 4.0;
-
     /// The first plan of `problem`, in order of estimated cost, that is free and costs less
     /// than `bound`.
     pub fn plan(
@@ -162,19 +166,22 @@ impl LibrarySearch {
         let mut free = std::mem::take(&mut self.free);
         free.clear();
         let mut plan = None;
-        while let Some(Candidate { estimate, index }) = self.queue.pop() {
-            if library.manoeuvres[index as usize].is_free(&base, problem) {
-                free.push(index);
-                let bound = bound.min(f64::from(estimate) + Self::WINDOW);
-                plan = self.join(library, index as usize, problem, model, bound);
+        while let Some(candidate) = self.queue.pop() {
+            if library.manoeuvres[candidate.index as usize].is_free(&base, problem) {
+                free.push(candidate);
+                let bound = bound.min(candidate.window());
+                plan = self.join(library, candidate.index as usize, problem, model, bound);
                 if plan.is_some() {
                     break;
                 }
             }
         }
         // Rather a long way round than none.
-        let again =
-            || free.iter().find_map(|&i| self.join(library, i as usize, problem, model, bound));
+        let again = || {
+            free.iter()
+                .filter(|c| c.window() < bound)
+                .find_map(|c| self.join(library, c.index as usize, problem, model, bound))
+        };
         plan = plan.or_else(again);
         self.free = free;
         plan
@@ -182,7 +189,7 @@ impl LibrarySearch {
 
     /// The manoeuvres found free in the last call, in the order they were tried.
     pub fn tried(&self) -> impl Iterator<Item = usize> + '_ {
-        self.free.iter().map(|&i| i as usize)
+        self.free.iter().map(|c| c.index as usize)
     }
 
     /// Fills the queue with all manoeuvres that may cost less than `bound`.
