@@ -167,6 +167,10 @@ mod tests {
         assert!(e.contains("max_expansions is 0; expected 1 to 1000000000"), "{e}");
         let e = error_of("start_heading_max = nan");
         assert!(e.contains("start_heading_max is NaN"), "{e}");
+        let e = error_of("[planner.goal_region]\nposition = nan");
+        assert!(e.contains(".toml: planner.goal_region.position is NaN"), "{e}");
+        let e = error_of("[planner.cost]\nforward = -1.0");
+        assert!(e.contains(".toml: planner.cost.forward is -1"), "{e}");
         let e = error_of("cells_per_shard = 100000");
         assert!(e.contains("rows in a file"), "{e}");
     }

@@ -140,7 +140,7 @@ impl ExperimentConfig {
         self.collect.validate().map_err(|e| format!("collect: {e}"))?;
         self.train.mlp.validate().map_err(|e| format!("train.mlp: {e}"))?;
         let e = &self.evaluate;
-        e.planner.validate().map_err(|m| format!("evaluate.{m}"))?;
+        e.planner.validate().map_err(|m| format!("evaluate.planner.{m}"))?;
         distinct("evaluate.methods", &e.methods, |m| m.name())?;
         distinct("evaluate.types", &e.types, |t| t.name())?;
         distinct("evaluate.levels", &e.levels, |l| l.name())?;

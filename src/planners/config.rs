@@ -82,9 +82,7 @@ impl Resolution {
             if (low..=high).contains(&v) {
                 return Ok(());
             }
-            Err(format!(
-                "planner.resolutions.{field} is {v}; expected a number from {low} to {high}"
-            ))
+            Err(format!("resolutions.{field} is {v}; expected a number from {low} to {high}"))
         };
         number("cell", self.cell, 0.02, 5.0)?;
         number("headings", self.headings as f64, 8.0, 1440.0)?;
@@ -92,7 +90,7 @@ impl Resolution {
         number("steers", self.steers as f64, 3.0, 63.0)?;
         if self.steers.is_multiple_of(2) {
             let steers = self.steers;
-            return Err(format!("planner.resolutions.steers is {steers}; expected an odd number"));
+            return Err(format!("resolutions.steers is {steers}; expected an odd number"));
         }
         Ok(())
     }
@@ -120,7 +118,8 @@ impl Default for HybridAStarConfig {
 }
 
 impl HybridAStarConfig {
-    /// Checks every field; the error says field, value and what would be right.
+    /// Checks every field; the error says field (below the table of these settings), value and
+    /// what would be right.
     pub fn validate(&self) -> Result<(), String> {
         self.cost.validate()?;
         for (field, v, low, high) in [
@@ -136,9 +135,7 @@ impl HybridAStarConfig {
             ("multi_heuristic.depth", self.multi_heuristic.depth, 0.0, 100.0),
         ] {
             if !(v.is_finite() && (low..=high).contains(&v)) {
-                return Err(format!(
-                    "planner.{field} is {v}; expected a number from {low} to {high}"
-                ));
+                return Err(format!("{field} is {v}; expected a number from {low} to {high}"));
             }
         }
         self.resolutions.iter().try_for_each(Resolution::validate)
@@ -216,9 +213,9 @@ mod tests {
         let mut config = HybridAStarConfig::default();
         assert_eq!(config.validate(), Ok(()));
         config.goal_region.position = f64::NAN;
-        assert!(config.validate().unwrap_err().contains("planner.goal_region.position is NaN"));
+        assert!(config.validate().unwrap_err().starts_with("goal_region.position is NaN"));
         config = HybridAStarConfig::default();
         config.multi_heuristic.slack = 0.5;
-        assert!(config.validate().unwrap_err().contains("planner.multi_heuristic.slack is 0.5"));
+        assert!(config.validate().unwrap_err().starts_with("multi_heuristic.slack is 0.5"));
     }
 }
