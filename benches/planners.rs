@@ -7,8 +7,8 @@
 mod common;
 
 use criterion::{Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
-use n3p::evaluation::{Method, Models};
-use n3p::planners::{Budget, HybridAStarConfig, NoPath, Problem};
+use n3p::evaluation::{Method, MethodSettings, Models};
+use n3p::planners::{Budget, NoPath, Problem};
 use n3p::vehicle::Vehicle;
 use n3p::world::generate::{GeneratorConfig, generate};
 use n3p::world::{Level, ParkingType};
@@ -20,7 +20,7 @@ fn bench(c: &mut Criterion) {
     let (config, vehicle) = (GeneratorConfig::default(), Vehicle::default());
     for method in Method::ALL {
         let models = Models::usual(method).expect("the models of the repository load");
-        let Ok(mut planner) = method.build(&models, &HybridAStarConfig::default()) else {
+        let Ok(mut planner) = method.build(&models, &MethodSettings::default()) else {
             continue;
         };
         let mut group = c.benchmark_group(method.name());

@@ -6,8 +6,8 @@
 
 use std::time::Instant;
 
-use n3p::evaluation::{Method, Models, suite};
-use n3p::planners::{Budget, HybridAStarConfig, Problem};
+use n3p::evaluation::{Method, MethodSettings, Models, suite};
+use n3p::planners::{Budget, Problem};
 use n3p::vehicle::Vehicle;
 use n3p::world::{Level, ParkingType};
 
@@ -24,7 +24,7 @@ fn main() -> anyhow::Result<()> {
     let levels = args.get(4).map_or(Ok(Level::ALL.to_vec()), |s| s.parse().map(|l| vec![l]))?;
 
     let models = Models::usual(method)?;
-    let mut planner = method.build(&models, &HybridAStarConfig::default())?;
+    let mut planner = method.build(&models, &MethodSettings::default())?;
     for &kind in &kinds {
         for &level in &levels {
             let cases = suite::generated(&Vehicle::default(), &[kind], &[level], count, SEED)?;

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use n3p::planners::{Budget, HybridAStarConfig, Planner, Problem};
 use n3p::selectors::artefact::Model;
-use n3p::selectors::guided::GuidedPlanner;
+use n3p::selectors::guided::{GuidedPlanner, RankedConfig};
 use n3p::world::Scene;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -22,7 +22,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let model = Model::load(Path::new("models/knn.bin"))?;
     model.check_vehicle(&scene.vehicle)?;
     let config = HybridAStarConfig::default();
-    let mut planner = GuidedPlanner::ranked("n3p", model.into_selector(), config);
+    let mut planner =
+        GuidedPlanner::ranked("n3p", model.into_selector(), config, RankedConfig::default());
 
     let result = planner.plan(&problem, Budget { max_expansions: 200_000 });
     let path = result.outcome?.to_world(&problem.frame);

@@ -1,7 +1,7 @@
 //! The graph-search baselines on generated scenes: their paths hold, and each is what its
 //! description says.
 
-use n3p::evaluation::{Method, Models, PathFile, oracle};
+use n3p::evaluation::{Method, MethodSettings, Models, PathFile, oracle};
 use n3p::planners::{Budget, HybridAStarConfig, NoPath, PlanResult, Problem};
 use n3p::vehicle::Vehicle;
 use n3p::world::generate::{GeneratorConfig, generate};
@@ -21,7 +21,7 @@ fn scenes() -> Vec<(ParkingType, Scene)> {
 /// The results of `method` on all scenes, after checking that they are certified, accepted
 /// by the independent check, and the same from a planner that never planned before.
 fn plan_all(method: Method) -> Vec<PlanResult> {
-    let build = || method.build(&Models::default(), &HybridAStarConfig::default()).unwrap();
+    let build = || method.build(&Models::default(), &MethodSettings::default()).unwrap();
     let mut planner = build();
     let plan = |(kind, scene): &(ParkingType, Scene)| {
         let problem = Problem::new(scene).unwrap();
@@ -96,7 +96,7 @@ fn holding_on_never_costs_more() {
 fn a_spent_budget_is_the_reason() {
     let (_, scene) = scenes().pop().unwrap();
     let problem = Problem::new(&scene).unwrap();
-    let mut planner = Method::Ha.build(&Models::default(), &HybridAStarConfig::default()).unwrap();
+    let mut planner = Method::Ha.build(&Models::default(), &MethodSettings::default()).unwrap();
     let result = planner.plan(&problem, Budget { max_expansions: 10 });
     assert_eq!((result.outcome, result.expansions), (Err(NoPath::BudgetSpent), 10));
 }

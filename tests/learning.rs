@@ -38,6 +38,7 @@ fn metadata() -> Metadata {
         max_expansions: 1000,
         solutions: 1,
         samples_per_cell: 50,
+        manoeuvres_per_cell: 50,
         start_behind: 0.0,
         start_heading_max: 0.5,
         cells_per_shard: 4,
@@ -99,7 +100,7 @@ fn samples(kind: ParkingType, cells: &[usize], per_cell: usize, seed: u64) -> Ve
 
 fn knn_of(samples: &[Sample], kinds: &[ParkingType], dir: &Path) -> KnnSelector {
     let path = dir.join("knn.bin");
-    training::knn::train(&metadata(), samples, "abc", kinds, &path).unwrap();
+    training::knn::train(&metadata(), samples, kinds, &path).unwrap();
     KnnSelector::load(&path).unwrap()
 }
 
@@ -219,7 +220,6 @@ fn one_file_holds_all_types_and_the_same_input_gives_the_same_bytes() {
     let error = training::knn::train(
         &metadata(),
         &samples(KIND, &[0], 5, 1),
-        "abc",
         &ParkingType::ALL,
         &dir.path().join("other.bin"),
     );
@@ -234,7 +234,7 @@ fn quick(epochs: usize) -> MlpConfig {
 }
 
 fn train_mlp(samples: &[Sample], config: &MlpConfig, path: &Path) -> training::mlp::TrainingLog {
-    training::mlp::train(&metadata(), samples, "abc", KIND, config, path).unwrap()
+    training::mlp::train(&metadata(), samples, KIND, config, path).unwrap()
 }
 
 #[test]
@@ -310,7 +310,7 @@ fn training_refuses_bad_rows_and_settings() {
     let out = dir.path().join("m.safetensors");
     let mut all = samples(KIND, &[0, 1], 20, 2);
     let train = |samples: &[Sample], config: &MlpConfig| {
-        training::mlp::train(&metadata(), samples, "abc", KIND, config, &out).unwrap_err()
+        training::mlp::train(&metadata(), samples, KIND, config, &out).unwrap_err()
     };
     let config = MlpConfig { batch: 0, ..MlpConfig::default() };
     assert!(train(&all, &config).to_string().starts_with("batch is 0"));

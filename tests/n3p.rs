@@ -2,9 +2,9 @@
 
 use n3p::curves::Segment;
 use n3p::curves::reeds_shepp::{Word, words};
-use n3p::evaluation::{Method, Models, PathFile, oracle, suite};
+use n3p::evaluation::{Method, MethodSettings, Models, PathFile, oracle, suite};
 use n3p::geometry::Pose;
-use n3p::planners::{Budget, HybridAStarConfig, Problem};
+use n3p::planners::{Budget, Problem};
 use n3p::selectors::Features;
 use n3p::selectors::artefact::Model;
 use n3p::vehicle::{Gear, Vehicle};
@@ -87,7 +87,7 @@ fn no_method_fails_on_900_scenes() {
     )
     .unwrap();
     let methods = [Method::HaRs, Method::KnnN3p, Method::N3p];
-    let mut planners = methods.map(|m| m.build(&models, &HybridAStarConfig::default()).unwrap());
+    let mut planners = methods.map(|m| m.build(&models, &MethodSettings::default()).unwrap());
     for case in &scenes {
         let problem = Problem::new(&case.scene).unwrap();
         for planner in &mut planners {

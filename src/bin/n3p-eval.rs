@@ -8,8 +8,7 @@ use clap::Parser;
 use n3p::cli::{self, OrBadInput};
 use n3p::evaluation::report::{self, Provenance};
 use n3p::evaluation::suite::{self, SuiteConfig};
-use n3p::evaluation::{Case, Method, Models, Outputs, metrics};
-use n3p::planners::HybridAStarConfig;
+use n3p::evaluation::{Case, Method, MethodSettings, Models, Outputs, metrics};
 use n3p::progress;
 use n3p::world::{Level, ParkingType};
 
@@ -67,7 +66,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
             [] => Method::available(&models),
             given => given.to_vec(),
         },
-        planner: HybridAStarConfig::default(),
+        settings: MethodSettings::default(),
         max_expansions: args.max_expansions,
         threads: args.threads.into(),
     };

@@ -8,9 +8,11 @@ use anyhow::Result;
 use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::evaluation::draw::{Drawing, scene_svg};
-use n3p::evaluation::{Case, Episode, EpisodeConfig, Method, Models, episode, trace};
+use n3p::evaluation::{
+    Case, Episode, EpisodeConfig, Method, MethodSettings, Models, episode, trace,
+};
 use n3p::files::{check_writable, reason, write_whole};
-use n3p::planners::{HybridAStarConfig, Problem};
+use n3p::planners::Problem;
 use n3p::world::Scene;
 
 /// Plans a path for one parking scene.
@@ -61,7 +63,7 @@ fn plan(args: &Args) -> Result<ExitCode> {
         check_writable(path).map_err(|e| unwritable(path, e))?;
     }
     let (method, models) = choose(args, &scene, &problem)?;
-    let mut planner = method.build(&models, &HybridAStarConfig::default()).or_bad_input()?;
+    let mut planner = method.build(&models, &MethodSettings::default()).or_bad_input()?;
     let case = Case { kind: problem.kind, level: None, scene };
     // One run, as it comes: the time includes what a first call costs.
     let once = EpisodeConfig { repeats: 0, ..EpisodeConfig::new(args.max_expansions) };
@@ -100,7 +102,7 @@ fn choose(args: &Args, scene: &Scene, problem: &Problem) -> Result<(Method, Mode
     };
     let models = models.or_bad_input()?;
     let fits = || -> Result<()> {
-        method.build(&models, &HybridAStarConfig::default()).or_bad_input()?;
+        method.build(&models, &MethodSettings::default()).or_bad_input()?;
         models.check_vehicle(&scene.name, &scene.vehicle).or_bad_input()?;
         problem.kind.map_or(Ok(()), |kind| models.check_kind(method, kind)).or_bad_input()
     };

@@ -91,13 +91,11 @@ fn mlp(args: &MlpArgs) -> anyhow::Result<ExitCode> {
     for kind in possible {
         artefact::check_writable(&out(kind)).or_bad_input()?;
     }
-    let (_, kinds) = read(&args.common)?;
+    let (data, kinds) = read(&args.common)?;
     for kind in kinds {
         let out = out(kind);
-        // Its own type alone, so that the model does not depend on what else is trained.
-        let data = Dataset::read(&args.common.data, Some(kind)).or_bad_input()?;
         let (metadata, samples) = (&data.metadata, &data.samples);
-        let log = training::mlp::train(metadata, samples, &data.sha256, kind, &config, &out)
+        let log = training::mlp::train(metadata, samples, kind, &config, &out)
             .map_err(|e| exit_code(e, &args.common.data))?;
         cli::print(format!(
             "{}: {} rows, best of {} epochs is {}; on {} unseen rows the median error is {:.2} m, \
@@ -119,9 +117,8 @@ fn mlp(args: &MlpArgs) -> anyhow::Result<ExitCode> {
 fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
     artefact::check_writable(&args.out).or_bad_input()?;
     let (data, kinds) = read(&args.common)?;
-    let report =
-        training::knn::train(&data.metadata, &data.samples, &data.sha256, &kinds, &args.out)
-            .map_err(|e| exit_code(e, &args.common.data))?;
+    let report = training::knn::train(&data.metadata, &data.samples, &kinds, &args.out)
+        .map_err(|e| exit_code(e, &args.common.data))?;
     for (kind, samples, cells, manoeuvres) in &report.kinds {
         let text = format!("{kind}: {samples} samples in {cells} cells, {manoeuvres} manoeuvres");
         cli::print(text)?;
@@ -134,11 +131,7 @@ fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
 /// The data set, and the parking types to train: the one asked for or all it holds.
 fn read(args: &Common) -> anyhow::Result<(Dataset, Vec<ParkingType>)> {
     let data = Dataset::read(&args.data, args.kind).or_bad_input()?;
-    let held = |kind: &ParkingType| data.samples.iter().any(|s| s.cell.kind == *kind);
-    let kinds = match args.kind {
-        Some(kind) => vec![kind],
-        None => ParkingType::ALL.into_iter().filter(held).collect(),
-    };
+    let kinds = args.kind.map_or_else(|| data.kinds(), |kind| vec![kind]);
     Ok((data, kinds))
 }
 

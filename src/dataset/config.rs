@@ -28,6 +28,9 @@ pub struct CollectConfig {
     pub solutions: u32,
     /// Samples per cell, 1 to 10⁶.
     pub samples_per_cell: u32,
+    /// The first so many samples of a cell keep how their paths end, 0 to 10⁶: the library of
+    /// manoeuvres needs no more, and they take as much space as all other columns.
+    pub manoeuvres_per_cell: u32,
     /// How far behind a cell's lane starts may lie, metres, 0 to 50; the lane is taken to go on
     /// there. Cars come along it, from farther than the cell reaches.
     pub start_behind: f64,
@@ -48,6 +51,7 @@ impl Default for CollectConfig {
             max_expansions: 50_000,
             solutions: 20,
             samples_per_cell: 100,
+            manoeuvres_per_cell: 100,
             start_behind: 8.0,
             start_heading_max: PI / 3.0,
             cells_per_shard: 16,
@@ -94,6 +98,10 @@ impl CollectConfig {
                 return Err(bad(format!("{field} is {value}; expected 1 to {max}")));
             }
         }
+        let kept = self.manoeuvres_per_cell;
+        if kept > 1_000_000 {
+            return Err(bad(format!("manoeuvres_per_cell is {kept}; expected 0 to 1000000")));
+        }
         let rows = u64::from(self.samples_per_cell) * u64::from(self.cells_per_shard);
         if rows > Self::MAX_SHARD_ROWS {
             return Err(bad(format!(
@@ -127,6 +135,7 @@ impl CollectConfig {
             max_expansions: self.max_expansions,
             solutions: self.solutions,
             samples_per_cell: self.samples_per_cell,
+            manoeuvres_per_cell: self.manoeuvres_per_cell,
             start_behind: self.start_behind,
             start_heading_max: self.start_heading_max,
             cells_per_shard: self.cells_per_shard,

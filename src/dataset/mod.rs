@@ -13,21 +13,26 @@
 //!
 //! [`schema`] defines one row; [`config`] what is collected; [`sampler`] draws and solves one
 //! sample; [`mod@collect`] runs the collection and [`mod@write`] its files; [`manifest`] is the folder's
-//! bookkeeping; [`read`] gives the rows back; [`split`] picks the cells that validate.
+//! bookkeeping; [`read`] gives the rows back; [`content_sha256`] names them; [`split`] picks the cells that validate, [`Subset`] a part of
+//! the whole.
 
 pub mod collect;
 pub mod config;
+mod identity;
 pub mod manifest;
 mod part;
 pub mod read;
 pub mod sampler;
 pub mod schema;
 pub mod split;
+mod subset;
 pub mod write;
 
 pub use collect::{CollectError, CollectOptions, TypeReport, collect};
 pub use config::{CollectConfig, ConfigError};
+pub use identity::content_sha256;
 pub use part::Part;
 pub use read::{Dataset, DatasetError};
 pub use schema::{Metadata, Sample, Status};
 pub use split::validation_cells;
+pub use subset::Subset;

@@ -11,12 +11,13 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use rayon::prelude::*;
 use serde_json::Value;
 
+use super::identity::content_sha256;
 use super::manifest::{Manifest, ShardRecord, manifest_path, metadata_path, shard_name};
 use super::schema::{
     FORMAT_VERSION, Metadata, Sample, Status, columns, first_difference, parse_manoeuvre,
 };
 use super::write::METADATA_KEY;
-use crate::files::{reason, sha256_hex};
+use crate::files::reason;
 use crate::geometry::Pose;
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
@@ -28,9 +29,6 @@ pub struct Dataset {
     pub metadata: Metadata,
     /// The rows: by type in the order of [`ParkingType::ALL`], then by cell and sample.
     pub samples: Vec<Sample>,
-    /// SHA-256 over `metadata.json` and the manifests of the types read, which hold the
-    /// checksums of all rows: names this very data set.
-    pub sha256: String,
 }
 
 /// Why a data set cannot be used.
@@ -132,10 +130,9 @@ impl Dataset {
                 kind: ParkingType::ALL[0],
             });
         }
-        let mut identity = read_file(&metadata_path(folder))?;
         let mut samples = Vec::new();
         for kind in kinds {
-            let manifest = read_manifest(folder, &metadata, kind, &mut identity)?;
+            let manifest = read_manifest(folder, &metadata, kind)?;
             let shards = manifest
                 .shards
                 .par_iter()
@@ -149,7 +146,19 @@ impl Dataset {
                 .collect::<Result<Vec<Vec<Sample>>, _>>()?;
             samples.extend(shards.into_iter().flatten());
         }
-        Ok(Dataset { metadata, samples, sha256: sha256_hex(&[&identity]) })
+        Ok(Dataset { metadata, samples })
+    }
+
+    /// The checksum that names the rows of these types, [`content_sha256`].
+    pub fn content_sha256(&self, kinds: &[ParkingType]) -> String {
+        let of_kinds = self.samples.iter().filter(|s| kinds.contains(&s.cell.kind));
+        content_sha256(&self.metadata, of_kinds)
+    }
+
+    /// The parking types that have rows.
+    pub fn kinds(&self) -> Vec<ParkingType> {
+        let held = |kind: &ParkingType| self.samples.iter().any(|s| s.cell.kind == *kind);
+        ParkingType::ALL.into_iter().filter(held).collect()
     }
 
     /// The solved rows.
@@ -220,12 +229,11 @@ pub fn read_metadata(folder: &Path) -> Result<Metadata, DatasetError> {
     Ok(metadata)
 }
 
-/// Reads and checks a type's manifest; its bytes go to `identity` too.
+/// Reads and checks a type's manifest.
 fn read_manifest(
     folder: &Path,
     metadata: &Metadata,
     kind: ParkingType,
-    identity: &mut Vec<u8>,
 ) -> Result<Manifest, DatasetError> {
     let path = manifest_path(folder, kind);
     if !path.exists() {
@@ -247,7 +255,6 @@ fn read_manifest(
         );
         return Err(DatasetError::Json { path, message });
     }
-    identity.extend(bytes);
     Ok(manifest)
 }
 

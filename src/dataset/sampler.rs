@@ -113,6 +113,7 @@ impl<'a> Sampler<'a> {
         let mut row = fill(unsolved(start, Status::NoPath), &result, tail.as_ref()).rounded();
         if let Ok(path) = &result.outcome
             && result.expansions > 0
+            && sample_index < config.manoeuvres_per_cell
         {
             row.manoeuvre = self.planner.manoeuvre(problem, path).unwrap_or_default();
             row = row.rounded();

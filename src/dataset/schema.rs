@@ -11,7 +11,7 @@ use crate::vehicle::Vehicle;
 use crate::world::cell::{Cell, Grid};
 
 /// Version of the data format that this crate writes and reads.
-pub const FORMAT_VERSION: u32 = 3;
+pub const FORMAT_VERSION: u32 = 4;
 
 /// Git revision of this build; `unknown` outside a checkout.
 pub const GIT_REVISION: &str = env!("N3P_GIT_REVISION");
@@ -91,8 +91,9 @@ pub struct Sample {
     /// Signed length of the entry straight after the curve, metres; rounded like the curve's.
     pub entry: f64,
     /// How the path ends: the motions from a pose that one curve from the start reaches, to
-    /// the goal. Empty where one curve reaches the goal itself. Rounded to f32; the pose
-    /// follows by driving back from the goal.
+    /// the goal. Empty where one curve reaches the goal itself, and beyond the first
+    /// `manoeuvres_per_cell` samples of a cell. Rounded to f32; the pose follows by driving
+    /// back from the goal.
     pub manoeuvre: Vec<Segment>,
     /// Length of the whole path, metres; rounded like the curve's.
     pub path_length: f64,
@@ -239,6 +240,8 @@ pub struct Metadata {
     pub solutions: u32,
     /// Samples per cell.
     pub samples_per_cell: u32,
+    /// The first samples of each cell, which keep their manoeuvres.
+    pub manoeuvres_per_cell: u32,
     /// How far behind a cell's lane starts lie, metres.
     pub start_behind: f64,
     /// Start headings are uniform in ± this angle, radians.
@@ -256,6 +259,14 @@ pub struct Metadata {
 impl Metadata {
     /// The fields that say which program ran, not what it was asked for.
     const BUILD: [&str; 2] = ["crate_version", "git_revision"];
+
+    /// What was asked for: all fields but `BUILD`.
+    pub(super) fn settings(&self) -> Value {
+        let mut value = serde_json::to_value(self).expect("metadata is plain data");
+        let fields = value.as_object_mut().expect("a struct is a JSON object");
+        fields.retain(|field, _| !Self::BUILD.contains(&field.as_str()));
+        value
+    }
 
     /// The first setting that differs between the two, `BUILD` aside.
     pub fn settings_difference(&self, current: &Metadata) -> Option<Difference> {

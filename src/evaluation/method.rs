@@ -10,7 +10,7 @@ use crate::planners::{
     HybridAStar, HybridAStarConfig, MultiHeuristicHybridAStar, PlainHybridAStar, Planner,
     ScenarioHybridAStar,
 };
-use crate::selectors::guided::GuidedPlanner;
+use crate::selectors::guided::{GuidedPlanner, RankedConfig};
 use crate::world::UnknownName;
 
 /// A row of the paper's tables, or our own.
@@ -64,6 +64,15 @@ const AVAILABLE: &str = "ha, ha-rs, ha-hold, mhha, sha, mlp-n3p, knn-n3p, n3p";
 
 /// How many solutions the paper's HA* Hold compares.
 const HOLD_SOLUTIONS: usize = 5;
+
+/// Settings of the planners that methods are built with.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MethodSettings {
+    /// Of every search.
+    pub planner: HybridAStarConfig,
+    /// Of the method `n3p`.
+    pub n3p: RankedConfig,
+}
 
 impl Method {
     /// All methods, in the order of the paper's tables, ours last.
@@ -124,16 +133,17 @@ impl Method {
 
     /// Every method that can be built from `models`.
     pub fn available(models: &Models) -> Vec<Method> {
-        let config = HybridAStarConfig::default();
-        Self::ALL.into_iter().filter(|m| m.build(models, &config).is_ok()).collect()
+        let settings = MethodSettings::default();
+        Self::ALL.into_iter().filter(|m| m.build(models, &settings).is_ok()).collect()
     }
 
     /// The planner of this method.
     pub fn build(
         self,
         models: &Models,
-        config: &HybridAStarConfig,
+        settings: &MethodSettings,
     ) -> Result<Box<dyn Planner + Send>, MethodError> {
+        let MethodSettings { planner: config, n3p } = settings;
         let no_model = |model, example| MethodError::NoModel { method: self, model, example };
         let selector = models.selector(self);
         match self {
@@ -152,7 +162,7 @@ impl Method {
             }
             Self::N3p => {
                 let selector = selector.ok_or_else(|| no_model("knn", "knn.bin"))?;
-                Ok(Box::new(GuidedPlanner::ranked(self.name(), selector, *config)))
+                Ok(Box::new(GuidedPlanner::ranked(self.name(), selector, *config, *n3p)))
             }
             Self::RlSimple | Self::RlEval => Err(MethodError::NotAvailable(self)),
         }
@@ -206,7 +216,7 @@ mod tests {
 
     #[test]
     fn without_a_model_the_error_says_what_to_do() {
-        let build = |m: Method| m.build(&Models::default(), &HybridAStarConfig::default());
+        let build = |m: Method| m.build(&Models::default(), &MethodSettings::default());
         let message = build(Method::N3p).err().unwrap().to_string();
         assert!(message.contains("--model") && message.contains("n3p-train knn"), "{message}");
         let message = build(Method::RlEval).err().unwrap().to_string();

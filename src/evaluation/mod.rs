@@ -24,7 +24,7 @@ pub mod trace;
 
 pub use episode::{Case, Episode, EpisodeConfig};
 pub use export::{PathFile, PathFileError};
-pub use method::{Method, MethodError};
+pub use method::{Method, MethodError, MethodSettings};
 pub use models::{Models, ModelsError};
 pub use outputs::{OutputError, Outputs};
 pub use rows::Row;

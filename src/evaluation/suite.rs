@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
 use super::episode::{self, Case, Episode, EpisodeConfig};
-use super::method::{Method, MethodError};
+use super::method::{Method, MethodError, MethodSettings};
 use super::models::{Models, ModelsError};
 use super::rows::Row;
-use crate::planners::{HybridAStarConfig, Planner, Problem, ProblemError};
+use crate::planners::{Planner, Problem, ProblemError};
 use crate::vehicle::Vehicle;
 use crate::world::generate::{GeneratorConfig, GeneratorError, generate};
 use crate::world::scene::SceneError;
@@ -20,8 +20,8 @@ use crate::world::{Level, ParkingType, Scene};
 pub struct SuiteConfig {
     /// The methods, in the order of the rows.
     pub methods: Vec<Method>,
-    /// Settings of every search.
-    pub planner: HybridAStarConfig,
+    /// Settings of the planners.
+    pub settings: MethodSettings,
     /// Expansion budget per episode.
     pub max_expansions: usize,
     /// Worker threads. More than one disturbs the times, never the results.
@@ -133,7 +133,7 @@ pub fn check(cases: &[Case], models: &Models, config: &SuiteConfig) -> Result<()
 impl SuiteConfig {
     /// The planners of all methods, in their order.
     pub fn build_all(&self, models: &Models) -> Result<Vec<Box<dyn Planner + Send>>, MethodError> {
-        self.methods.iter().map(|m| m.build(models, &self.planner)).collect()
+        self.methods.iter().map(|m| m.build(models, &self.settings)).collect()
     }
 }
 

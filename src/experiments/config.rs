@@ -9,6 +9,7 @@ use crate::evaluation::Method;
 use crate::evaluation::suite::MAX_COUNT;
 use crate::files::{TomlError, read_toml};
 use crate::planners::HybridAStarConfig;
+use crate::selectors::guided::RankedConfig;
 use crate::training::MlpConfig;
 use crate::vehicle::Vehicle;
 use crate::world::{Level, ParkingType};
@@ -72,6 +73,9 @@ pub struct EvaluateConfig {
     /// Settings of every search.
     #[serde(default)]
     pub planner: HybridAStarConfig,
+    /// Settings of the method `n3p`.
+    #[serde(default)]
+    pub n3p: RankedConfig,
 }
 
 fn all_types() -> Vec<ParkingType> {
@@ -141,6 +145,7 @@ impl ExperimentConfig {
         self.train.mlp.validate().map_err(|e| format!("train.mlp: {e}"))?;
         let e = &self.evaluate;
         e.planner.validate().map_err(|m| format!("evaluate.planner.{m}"))?;
+        e.n3p.validate().map_err(|m| format!("evaluate.n3p.{m}"))?;
         distinct("evaluate.methods", &e.methods, |m| m.name())?;
         distinct("evaluate.types", &e.types, |t| t.name())?;
         distinct("evaluate.levels", &e.levels, |l| l.name())?;

@@ -25,7 +25,9 @@ use crate::dataset::{CollectError, CollectOptions, Dataset, DatasetError, collec
 use crate::evaluation::report::Provenance;
 use crate::evaluation::rows::{Row, RowsError, read_csv};
 use crate::evaluation::suite;
-use crate::evaluation::{Models, ModelsError, OutputError, Outputs, SuiteConfig, SuiteError};
+use crate::evaluation::{
+    MethodSettings, Models, ModelsError, OutputError, Outputs, SuiteConfig, SuiteError,
+};
 use crate::files::{reason, remove_leftovers, sha256_hex, write_whole};
 use crate::progress;
 use crate::training::{self, TrainingError};
@@ -233,7 +235,7 @@ impl Runner<'_> {
         let knn_settings = settings(("knn", &data));
         if self.begin("train-knn", &knn_settings)? != Todo::Nothing || !knn.exists() {
             let set = self.dataset(&mut read)?;
-            training::knn::train(&set.metadata, &set.samples, &set.sha256, kinds, &knn)?;
+            training::knn::train(&set.metadata, &set.samples, kinds, &knn)?;
             self.record("train-knn", &knn_settings, true)?;
         }
         if !self.config.needs_mlp() {
@@ -247,8 +249,7 @@ impl Runner<'_> {
                 continue;
             }
             let set = self.dataset(&mut read)?;
-            let log =
-                training::mlp::train(&set.metadata, &set.samples, &set.sha256, kind, mlp, &out)?;
+            let log = training::mlp::train(&set.metadata, &set.samples, kind, mlp, &out)?;
             tracing::info!(
                 "{stage}: best of {} epochs is {}, median error {:.2} m on unseen cells",
                 log.losses.len(),
@@ -292,7 +293,7 @@ impl Runner<'_> {
         let models = self.models()?;
         let suite_config = SuiteConfig {
             methods: e.methods.clone(),
-            planner: e.planner,
+            settings: MethodSettings { planner: e.planner, n3p: e.n3p },
             max_expansions: e.max_expansions,
             threads: 1,
         };

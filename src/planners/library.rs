@@ -77,6 +77,13 @@ impl Library {
         self.manoeuvres.len()
     }
 
+    /// The manoeuvres that are free in `problem`, whatever its start.
+    pub fn free_in(&self, problem: &Problem) -> Vec<usize> {
+        let base = BodyFrame::new(problem.goal);
+        let free = |i: &usize| self.manoeuvres[*i].is_free(&base, problem);
+        (0..self.len()).filter(free).collect()
+    }
+
     /// Whether it knows nothing.
     pub fn is_empty(&self) -> bool {
         self.manoeuvres.is_empty()
@@ -161,13 +168,40 @@ impl LibrarySearch {
         bound: f64,
     ) -> Option<LibraryPlan> {
         debug_assert!(library.fits(problem));
-        self.rank(library, problem, model, bound);
+        self.rank(library, 0..library.len(), problem, model, bound);
         let base = BodyFrame::new(problem.goal);
+        let is_free = |i: usize| library.manoeuvres[i].is_free(&base, problem);
+        self.first(library, is_free, problem, model, bound)
+    }
+
+    /// The same where it is known which manoeuvres are `free`, as for many starts in one
+    /// environment ([`Library::free_in`]).
+    pub fn plan_among(
+        &mut self,
+        library: &Library,
+        free: &[usize],
+        problem: &Problem,
+        model: &CostModel,
+        bound: f64,
+    ) -> Option<LibraryPlan> {
+        self.rank(library, free.iter().copied(), problem, model, bound);
+        self.first(library, |_| true, problem, model, bound)
+    }
+
+    /// The first plan of the queue.
+    fn first(
+        &mut self,
+        library: &Library,
+        is_free: impl Fn(usize) -> bool,
+        problem: &Problem,
+        model: &CostModel,
+        bound: f64,
+    ) -> Option<LibraryPlan> {
         let mut free = std::mem::take(&mut self.free);
         free.clear();
         let mut plan = None;
         while let Some(candidate) = self.queue.pop() {
-            if library.manoeuvres[candidate.index as usize].is_free(&base, problem) {
+            if is_free(candidate.index as usize) {
                 free.push(candidate);
                 let bound = bound.min(candidate.window());
                 plan = self.join(library, candidate.index as usize, problem, model, bound);
@@ -192,14 +226,22 @@ impl LibrarySearch {
         self.free.iter().map(|c| c.index as usize)
     }
 
-    /// Fills the queue with all manoeuvres that may cost less than `bound`.
-    fn rank(&mut self, library: &Library, problem: &Problem, model: &CostModel, bound: f64) {
+    /// Fills the queue with those of `manoeuvres` that may cost less than `bound`.
+    fn rank(
+        &mut self,
+        library: &Library,
+        manoeuvres: impl Iterator<Item = usize>,
+        problem: &Problem,
+        model: &CostModel,
+        bound: f64,
+    ) {
         self.estimate.reset(&problem.vehicle, model);
         let mut queue = std::mem::take(&mut self.queue).into_vec();
         queue.clear();
         let goal = problem.start.relative(problem.goal);
         let seen_from_start = BodyFrame::new(goal);
-        for (index, m) in library.manoeuvres.iter().enumerate() {
+        for index in manoeuvres {
+            let m = &library.manoeuvres[index];
             let begin = m.entry.pose;
             let position = seen_from_start.parent(begin.position());
             let pose = Pose::new(position.x, position.y, goal.heading + begin.heading);

@@ -9,6 +9,8 @@
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use crate::curves::{Path, Segment};
 use crate::geometry::{Pose, Vec2};
 use crate::planners::hybrid_astar::{Entry, GoalSet, Leg};
@@ -21,10 +23,6 @@ use crate::world::abstraction::{Abstraction, abstractions};
 
 use super::{Features, PoseSelector};
 
-/// How many ranked poses `n3p` asks for in each abstraction.
-const CANDIDATES: usize = 12;
-/// How many abstractions `n3p` tries.
-const ABSTRACTIONS: usize = 3;
 /// Expansions that the paper's two legs may spend, so that a pose just beside the feasible
 /// ones does not use up what the full search needs.
 const LEG_EXPANSIONS: usize = 5_000;
@@ -32,10 +30,41 @@ const LEG_EXPANSIONS: usize = 5_000;
 /// the goal itself.
 const APPROACH_EXPANSIONS: usize = 5_000;
 
+/// What `n3p` tries before it searches. The paper's rows have no such settings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RankedConfig {
+    /// Whether the selector's known manoeuvres come first.
+    pub library: bool,
+    /// Ranked poses asked for in each abstraction, 1 to 1000.
+    pub candidates: usize,
+    /// Abstractions tried, 1 to 1000.
+    pub abstractions: usize,
+}
+
+impl Default for RankedConfig {
+    fn default() -> Self {
+        Self { library: true, candidates: 12, abstractions: 3 }
+    }
+}
+
+impl RankedConfig {
+    /// Checks every field; the message names it.
+    pub fn validate(&self) -> Result<(), String> {
+        for (field, value) in [("candidates", self.candidates), ("abstractions", self.abstractions)]
+        {
+            if !(1..=1000).contains(&value) {
+                return Err(format!("{field} is {value}; expected 1 to 1000"));
+            }
+        }
+        Ok(())
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Strategy {
     Paper,
-    Ranked,
+    Ranked(RankedConfig),
 }
 
 /// N3P over a selector.
@@ -57,8 +86,13 @@ impl GuidedPlanner {
     }
 
     /// Ours (`n3p`): known manoeuvres and ranked poses before any search.
-    pub fn ranked(name: &str, selector: Arc<dyn PoseSelector>, config: HybridAStarConfig) -> Self {
-        Self::new(name, Strategy::Ranked, selector, config)
+    pub fn ranked(
+        name: &str,
+        selector: Arc<dyn PoseSelector>,
+        config: HybridAStarConfig,
+        ranked: RankedConfig,
+    ) -> Self {
+        Self::new(name, Strategy::Ranked(ranked), selector, config)
     }
 
     fn new(
@@ -139,9 +173,12 @@ impl GuidedPlanner {
         &mut self,
         problem: &Problem,
         found: &[Abstraction],
+        config: RankedConfig,
         left: &mut usize,
     ) -> Result<(Path, Guidance), NoPath> {
-        if let Some(plan) = self.look_up(problem) {
+        if config.library
+            && let Some(plan) = self.look_up(problem)
+        {
             let guidance = Guidance {
                 abstraction: found.first().copied(),
                 preparatory: Some(plan.preparatory),
@@ -151,8 +188,8 @@ impl GuidedPlanner {
         }
         let plain = self.hars.goal_set(problem);
         let mut goal = plain.clone();
-        for found in found.iter().take(ABSTRACTIONS) {
-            self.select(problem, found, CANDIDATES);
+        for found in found.iter().take(config.abstractions) {
+            self.select(problem, found, config.candidates);
             let of_cell = self.hars.goal_set_of_cell(problem, found.shift);
             for i in 0..self.poses.len() {
                 let pose = self.poses[i];
@@ -247,7 +284,7 @@ impl Planner for GuidedPlanner {
                 Some(planned) => Ok(planned),
                 None => self.fall_back(problem, &mut left),
             },
-            Strategy::Ranked => self.plan_ranked(problem, &found, &mut left),
+            Strategy::Ranked(config) => self.plan_ranked(problem, &found, config, &mut left),
         };
         let expansions = budget.max_expansions - left;
         match planned {

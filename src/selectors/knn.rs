@@ -112,9 +112,8 @@ impl KnnSelector {
             return Some(cell);
         }
         let header = self.file.header();
-        let n_dead = header.grid.dead_end.len();
-        let n_spot = header.grid.spot_width(header.kinds[kind].kind).len();
-        let (lane, spot, dead) = (cell / (n_dead * n_spot), cell / n_dead % n_spot, cell % n_dead);
+        let (grid, parking_type) = (&header.grid, header.kinds[kind].kind);
+        let [lane, spot, dead] = grid.place(parking_type, cell);
         let mut best: Option<(usize, usize)> = None;
         for l in (0..=lane).rev() {
             for s in (0..=spot).rev() {
@@ -123,7 +122,7 @@ impl KnnSelector {
                     if best.is_some_and(|(least, _)| steps >= least) {
                         break;
                     }
-                    let candidate = (l * n_spot + s) * n_dead + d;
+                    let candidate = grid.index(parking_type, [l, s, d]);
                     if !self.file.samples(kind, candidate).is_empty() {
                         best = Some((steps, candidate));
                     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{TrainingError, library, solved};
-use crate::dataset::{Metadata, Sample};
+use crate::dataset::{Metadata, Sample, content_sha256};
 use crate::geometry::Pose;
 use crate::selectors::artefact;
 use crate::selectors::knn_file::{self, KindHeader, KnnEntries, KnnEntry, KnnHeader};
@@ -25,26 +25,33 @@ pub struct KnnReport {
 pub fn train(
     metadata: &Metadata,
     samples: &[Sample],
-    data_sha256: &str,
     kinds: &[ParkingType],
     out: &Path,
 ) -> Result<KnnReport, TrainingError> {
-    let mut headers = Vec::new();
-    let mut entries = Vec::new();
-    let mut report = Vec::new();
+    let mut known = Vec::new();
     for &kind in kinds {
-        let cells = metadata.grid.cell_count(kind);
-        let solved = solved(samples, kind, cells)?;
+        let solved = solved(samples, kind, metadata.grid.cell_count(kind))?;
         if solved.is_empty() {
             return Err(TrainingError::NoSamples(kind));
         }
+        known.push((kind, solved));
+    }
+    let libraries: Vec<_> = std::thread::scope(|scope| {
+        let condense = |(kind, solved): &(ParkingType, Vec<&Sample>)| {
+            library::condense(metadata, *kind, solved)
+        };
+        let running: Vec<_> = known.iter().map(|k| scope.spawn(move || condense(k))).collect();
+        running.into_iter().map(|r| r.join().expect("condensing does not panic")).collect()
+    });
+    let mut headers = Vec::new();
+    let mut entries = Vec::new();
+    let mut report = Vec::new();
+    for ((kind, solved), manoeuvres) in known.into_iter().zip(libraries) {
+        let cells = metadata.grid.cell_count(kind);
         let occupied = solved.chunk_by(|a, b| a.cell_index == b.cell_index).count();
         let entry =
             |s: &&Sample| KnnEntry { cell: s.cell_index, start: s.start, preparatory: s.rs_start };
-        let collected = KnnEntries {
-            samples: solved.iter().map(entry).collect(),
-            manoeuvres: library::condense(metadata, kind, &solved),
-        };
+        let collected = KnnEntries { samples: solved.iter().map(entry).collect(), manoeuvres };
         report.push((kind, solved.len(), occupied, collected.manoeuvres.len()));
         headers.push(KindHeader {
             kind,
@@ -55,13 +62,14 @@ pub fn train(
         });
         entries.push(collected);
     }
+    let of_kinds = samples.iter().filter(|s| kinds.contains(&s.cell.kind));
     let header = KnnHeader {
         vehicle: metadata.vehicle,
         grid: metadata.grid,
         heading_radius: metadata.vehicle.turning_radius() / 2.0,
         extent: extent(&entries),
         kinds: headers,
-        data_sha256: data_sha256.to_owned(),
+        data_sha256: content_sha256(metadata, of_kinds),
         seed: metadata.seed,
         crate_version: env!("CARGO_PKG_VERSION").to_owned(),
     };

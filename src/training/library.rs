@@ -38,19 +38,32 @@ pub(super) fn condense(
     let mut search = LibrarySearch::default();
     let mut library = Library::new(&[], vehicle, vehicle.footprint(Problem::MARGIN), &planner.cost);
     let mut manoeuvres = Vec::new();
-    let taken = spread(solved);
-    for_each_problem(metadata, kind, &taken, |sample, problem| {
-        let Some((manoeuvre, cost)) = ending(&mut hars, metadata, sample, problem) else { return };
-        if search.plan(&library, problem, &planner.cost, cost + TOLERANCE).is_none() {
-            library.add(manoeuvre.clone(), &planner.cost);
-            manoeuvres.push(manoeuvre);
+    let taken = spread(solved, metadata.manoeuvres_per_cell);
+    for_each_cell(metadata, kind, &taken, |problem, samples| {
+        let mut free = library.free_in(problem);
+        for sample in samples {
+            problem.start = sample.start;
+            let Some((manoeuvre, cost)) = ending(&mut hars, metadata, sample, problem) else {
+                continue;
+            };
+            let bound = cost + TOLERANCE;
+            if search.plan_among(&library, &free, problem, &planner.cost, bound).is_none() {
+                free.push(library.len());
+                library.add(manoeuvre.clone(), &planner.cost);
+                manoeuvres.push(manoeuvre);
+            }
         }
     });
     let mut records = vec![Record::default(); manoeuvres.len()];
-    for_each_problem(metadata, kind, &taken, |_, problem| {
-        if let Some(plan) = search.plan(&library, problem, &planner.cost, f64::INFINITY) {
-            records[plan.manoeuvre].uses += 1;
-            search.tried().for_each(|i| records[i].tries += 1);
+    for_each_cell(metadata, kind, &taken, |problem, samples| {
+        let free = library.free_in(problem);
+        for sample in samples {
+            problem.start = sample.start;
+            let plan = search.plan_among(&library, &free, problem, &planner.cost, f64::INFINITY);
+            if let Some(plan) = plan {
+                records[plan.manoeuvre].uses += 1;
+                search.tried().for_each(|i| records[i].tries += 1);
+            }
         }
     });
     let mut records = records.into_iter();
@@ -73,22 +86,24 @@ impl Record {
     }
 }
 
-/// At most [`MOST_SAMPLES`]: the first ones of every cell, in order of cells.
-fn spread<'a>(solved: &[&'a Sample]) -> Vec<&'a Sample> {
-    let mut taken = solved.to_vec();
+/// At most [`MOST_SAMPLES`] of those that may have a manoeuvre, the first `per_cell` ones of every
+/// cell; in order of cells.
+fn spread<'a>(solved: &[&'a Sample], per_cell: u32) -> Vec<&'a Sample> {
+    let kept = solved.iter().filter(|s| s.sample_index < per_cell);
+    let mut taken: Vec<&Sample> = kept.copied().collect();
     taken.sort_by_key(|s| (s.sample_index, s.cell_index));
     taken.truncate(MOST_SAMPLES);
     taken.sort_by_key(|s| (s.cell_index, s.sample_index));
     taken
 }
 
-/// Calls `each` with every sample and its problem. Samples whose start or goal is nearer to
-/// the walls than the planners' margin are left out.
-fn for_each_problem(
+/// Calls `each` with the problem of every cell and its samples. Those whose start or goal is
+/// nearer to the walls than the planners' margin are left out.
+fn for_each_cell(
     metadata: &Metadata,
     kind: ParkingType,
     samples: &[&Sample],
-    mut each: impl FnMut(&Sample, &Problem),
+    mut each: impl FnMut(&mut Problem, &[&Sample]),
 ) {
     let Metadata { vehicle, grid, .. } = metadata;
     let footprint = vehicle.footprint(Problem::MARGIN);
@@ -102,10 +117,9 @@ fn for_each_problem(
         if *problem.collision.footprint() != footprint {
             continue;
         }
-        for sample in of_cell.iter().filter(|s| problem.collision.pose_is_free(s.start)) {
-            problem.start = sample.start;
-            each(sample, &problem);
-        }
+        let is_free = |s: &&&Sample| problem.collision.pose_is_free(s.start);
+        let samples: Vec<&Sample> = of_cell.iter().filter(is_free).copied().collect();
+        each(&mut problem, &samples);
     }
 }
 

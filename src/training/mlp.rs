@@ -21,7 +21,7 @@ use super::curve::{self, EpochLoss};
 use super::optimiser::AdamW;
 use super::targets::{self, Example};
 use super::{Loss, MlpConfig, TrainingError, Validation, solved};
-use crate::dataset::{Metadata, Sample, validation_cells};
+use crate::dataset::{Metadata, Sample, content_sha256, validation_cells};
 use crate::geometry::{Pose, signed_angle};
 use crate::progress;
 use crate::rng::{Stream, rng};
@@ -83,7 +83,6 @@ pub struct TrainingLog {
 pub fn train(
     metadata: &Metadata,
     samples: &[Sample],
-    data_sha256: &str,
     kind: ParkingType,
     config: &MlpConfig,
     out: &Path,
@@ -110,7 +109,7 @@ pub fn train(
         layers: LAYERS.to_vec(),
         input: Normaliser::fit(&raw_inputs),
         output: Normaliser::fit(&raw_outputs),
-        data_sha256: data_sha256.to_owned(),
+        data_sha256: content_sha256(metadata, samples.iter().filter(|s| s.cell.kind == kind)),
         seed: config.seed,
         training: serde_json::to_value(config).expect("settings are plain data"),
         crate_version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -124,7 +123,7 @@ pub fn train(
     let mut log = TrainingLog {
         kind,
         config: config.clone(),
-        data_sha256: data_sha256.to_owned(),
+        data_sha256: header.data_sha256.clone(),
         train_rows: train.len(),
         validation_rows: validation_rows.len(),
         losses: Vec::new(),

@@ -177,13 +177,24 @@ impl Grid {
 
     /// The cell with `index` in `0..cell_count`: dead end fastest, then spot, then lane.
     pub fn cell(&self, kind: ParkingType, index: usize) -> Cell {
-        let (nd, ns) = (self.dead_end.len(), self.spot_width(kind).len());
+        let [lane, spot, dead_end] = self.place(kind, index);
         Cell {
             kind,
-            lane_width: self.lane_width.value(index / (nd * ns)),
-            spot_width: self.spot_width(kind).value(index / nd % ns),
-            dead_end: self.dead_end.value(index % nd),
+            lane_width: self.lane_width.value(lane),
+            spot_width: self.spot_width(kind).value(spot),
+            dead_end: self.dead_end.value(dead_end),
         }
+    }
+
+    /// Indices of lane width, spot width and dead end of the cell with `index`.
+    pub fn place(&self, kind: ParkingType, index: usize) -> [usize; 3] {
+        let (nd, ns) = (self.dead_end.len(), self.spot_width(kind).len());
+        [index / (nd * ns), index / nd % ns, index % nd]
+    }
+
+    /// Index of the cell at `place`; undoes [`Grid::place`].
+    pub fn index(&self, kind: ParkingType, [lane, spot, dead_end]: [usize; 3]) -> usize {
+        (lane * self.spot_width(kind).len() + spot) * self.dead_end.len() + dead_end
     }
 
     /// Index of the largest grid cell ≤ `cell` in every parameter (paper, eq. 8):
@@ -193,7 +204,7 @@ impl Grid {
         let lane = self.lane_width.floor(cell.lane_width)?;
         let spot = self.spot_width(cell.kind).floor(cell.spot_width)?;
         let dead_end = self.dead_end.floor(cell.dead_end)?;
-        Some((lane * self.spot_width(cell.kind).len() + spot) * self.dead_end.len() + dead_end)
+        Some(self.index(cell.kind, [lane, spot, dead_end]))
     }
 
     /// The parked rear-axle pose in the spot frame.
@@ -238,6 +249,7 @@ mod tests {
         let kind = ParkingType::Reverse;
         for i in 0..g.cell_count(kind) {
             assert_eq!(g.floor(&g.cell(kind, i)), Some(i));
+            assert_eq!(g.index(kind, g.place(kind, i)), i);
         }
         let c = Cell { kind, lane_width: 6.49, spot_width: 2.54, dead_end: 99.0 };
         let f = g.cell(kind, g.floor(&c).unwrap());
