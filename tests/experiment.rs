@@ -29,6 +29,12 @@ parallel_depth = 2.4
 epochs = 2
 validation_share = 0.25
 
+[learning_curve]
+methods = ["knn-n3p", "n3p"]
+count = 2
+seed = 12
+parts = [{ samples_per_cell = 5 }, { lane_width = 2, samples_per_cell = 10 }]
+
 [evaluate]
 methods = ["ha-rs", "mlp-n3p", "knn-n3p", "n3p"]
 types = ["reverse"]
@@ -56,6 +62,11 @@ fn runs_goes_on_and_reproduces() {
     for file in files.into_iter().chain(["models/knn.bin"]) {
         assert!(results.join(file).exists(), "{file}");
     }
+    let report = std::fs::read_to_string(results.join("report.md")).unwrap();
+    let curve = |steps, per_cell| format!("| reverse | knn-n3p | {steps} / 1 / 2 | {per_cell} |");
+    assert!(report.contains(&curve(1, 5)) && report.contains(&curve(2, 10)), "{report}");
+    let page = std::fs::read_to_string(results.join("report.html")).unwrap();
+    assert!(page.contains("id=\"plot-curve\"") && page.contains("5 in each cell"));
     let traces = std::fs::read_to_string(results.join("traces.jsonl")).unwrap();
     assert_eq!(traces.lines().count(), 2 * 3 * 4);
     let rows_csv = results.join("rows.csv");
@@ -86,6 +97,27 @@ fn runs_goes_on_and_reproduces() {
     assert_eq!(std::fs::read(&rows_csv).unwrap()[..kept], half[..kept], "rows done are kept");
 
     experiment(dir.path(), &["reproduce", "tiny.toml"]).success().stdout(contains("24 rows agree"));
+    let models = ["reproduce", "tiny.toml", "--models", "results/tiny/models", "--out", "again"];
+    experiment(dir.path(), &models).success().stdout(contains("24 rows agree"));
+    assert!(!dir.path().join("again/dataset").exists(), "nothing is collected");
+    let data = ["reproduce", "tiny.toml", "--data", "results/tiny/dataset", "--out", "anew"];
+    experiment(dir.path(), &data).success().stdout(contains("24 rows agree"));
+    assert!(!dir.path().join("anew/dataset").exists());
+    let model =
+        |folder: &str| std::fs::read(dir.path().join(folder).join("models/knn.bin")).unwrap();
+    assert!(model("anew") == model("results/tiny"), "the same data, the same model");
+
+    let other = TINY.replace("samples_per_cell = 20", "samples_per_cell = 21");
+    std::fs::write(dir.path().join("other.toml"), other).unwrap();
+    for (arguments, told) in [
+        (["other.toml", "--data", "results/tiny/dataset"], "samples_per_cell is 20, but the"),
+        (["tiny.toml", "--data", "nowhere"], "--data: nowhere: no data set here"),
+        (["tiny.toml", "--models", "nowhere"], "--models: model nowhere/knn.bin: no such file"),
+    ] {
+        let arguments = [&["run", "--out", "refused"][..], &arguments[..]].concat();
+        experiment(dir.path(), &arguments).code(2).stderr(contains(told));
+        assert!(!dir.path().join("refused").exists(), "nothing is written");
+    }
     let other =
         std::fs::read_to_string(&rows_csv).unwrap().replacen("ha-rs,true", "ha-rs,false", 1);
     std::fs::write(&rows_csv, other).unwrap();

@@ -84,7 +84,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
     bar.finish_and_clear();
 
     let provenance = Provenance::here(scenes, args.seed, args.max_expansions, args.threads.into());
-    outputs.finish("Evaluation", &cases, &rows, &provenance)?;
+    outputs.finish("Evaluation", &cases, &rows, &[], &provenance)?;
     if args.json {
         let groups = metrics::summarise(&rows, args.seed);
         let all = serde_json::json!({"provenance": provenance, "rows": rows, "groups": groups});

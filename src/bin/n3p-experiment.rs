@@ -4,17 +4,17 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Result;
-use clap::{Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::evaluation::{report, rows};
-use n3p::experiments::{ExperimentConfig, ExperimentError, runner};
+use n3p::experiments::{ExperimentConfig, ExperimentError, Given, runner};
 use n3p::files::reason;
 use n3p::training;
 
 /// Runs experiments: collect, train, evaluate and report, all from one file.
 #[derive(Parser)]
 #[command(version)]
-struct Args {
+struct Cli {
     #[command(subcommand)]
     command: Command,
 }
@@ -28,6 +28,8 @@ enum Command {
         /// Folder of the results [default: results/NAME beside the file].
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
+        #[command(flatten)]
+        given: GivenArgs,
     },
     /// Runs an experiment anew and compares its rows with the ones on record; everything
     /// but times must agree. Exit code 1 if not.
@@ -37,6 +39,8 @@ enum Command {
         /// Folder of the new results [default: a temporary one].
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
+        #[command(flatten)]
+        given: GivenArgs,
     },
     /// Lists the experiments of a folder.
     List {
@@ -46,23 +50,40 @@ enum Command {
     },
 }
 
+#[derive(Args)]
+struct GivenArgs {
+    /// Data set to train from instead of collecting one; it must have the experiment's settings
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Folder of models to evaluate instead of collecting and training: knn.bin,
+    /// mlp-TYPE.safetensors
+    #[arg(long, value_name = "DIR", conflicts_with = "data")]
+    models: Option<PathBuf>,
+}
+
+impl From<&GivenArgs> for Given {
+    fn from(args: &GivenArgs) -> Self {
+        Self { data: args.data.clone(), models: args.models.clone() }
+    }
+}
+
 /// Differences printed in full.
 const SHOWN: usize = 20;
 
 fn main() -> ExitCode {
     training::single_threaded();
-    let args = cli::parse::<Args>();
+    let args = cli::parse::<Cli>();
     cli::run(|| match &args.command {
-        Command::Run { file, out } => run(file, out.as_deref()),
-        Command::Reproduce { file, out } => reproduce(file, out.as_deref()),
+        Command::Run { file, out, given } => run(file, out.as_deref(), &given.into()),
+        Command::Reproduce { file, out, given } => reproduce(file, out.as_deref(), &given.into()),
         Command::List { folder } => list(folder),
     })
 }
 
-fn run(file: &Path, out: Option<&Path>) -> Result<ExitCode> {
+fn run(file: &Path, out: Option<&Path>, given: &Given) -> Result<ExitCode> {
     let config = ExperimentConfig::read(file).or_bad_input()?;
     let out = out.map_or_else(|| results(file, &config), Path::to_owned);
-    let rows = runner::run(&config, &out).map_err(exit_code)?;
+    let rows = runner::run(&config, given, &out).map_err(exit_code)?;
     cli::print(report::text(&rows, config.evaluate.seed).trim_end())?;
     cli::print(format!(
         "{}: config, data set, models, rows; start with report.html",
@@ -71,7 +92,7 @@ fn run(file: &Path, out: Option<&Path>) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn reproduce(file: &Path, out: Option<&Path>) -> Result<ExitCode> {
+fn reproduce(file: &Path, out: Option<&Path>, given: &Given) -> Result<ExitCode> {
     let config = ExperimentConfig::read(file).or_bad_input()?;
     let recorded = results(file, &config).join("rows.csv");
     if !recorded.exists() {
@@ -84,7 +105,7 @@ fn reproduce(file: &Path, out: Option<&Path>) -> Result<ExitCode> {
     }
     let expected = rows::read_csv(&recorded).or_bad_input()?;
     let temporary = tempfile::tempdir()?;
-    let found = runner::run(&config, out.unwrap_or(temporary.path())).map_err(exit_code)?;
+    let found = runner::run(&config, given, out.unwrap_or(temporary.path())).map_err(exit_code)?;
     let lines = runner::differences(&expected, &found);
     if lines.is_empty() {
         cli::print(format!("{} rows agree with {}", found.len(), recorded.display()))?;

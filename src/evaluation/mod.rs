@@ -5,12 +5,13 @@
 //! [`oracle`]; [`suite`] does so for all; [`rows`] are saved; [`metrics`] summarises them,
 //! [`table`] lays them out beside the paper's, [`report`] writes them down, and [`html`] with
 //! plots and a gallery of the paths that [`trace`] kept. [`draw`] makes pictures of scenes and
-//! paths.
+//! paths. [`learning_curve`] is what experiments add: how much data is enough.
 
 pub mod draw;
 pub mod episode;
 pub mod export;
 pub mod html;
+pub mod learning_curve;
 mod method;
 pub mod metrics;
 mod models;
@@ -24,6 +25,7 @@ pub mod trace;
 
 pub use episode::{Case, Episode, EpisodeConfig};
 pub use export::{PathFile, PathFileError};
+pub use learning_curve::CurvePoint;
 pub use method::{Method, MethodError, MethodSettings};
 pub use models::{Models, ModelsError};
 pub use outputs::{OutputError, Outputs};

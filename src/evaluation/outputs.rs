@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use super::episode::{Case, Episode};
 use super::export::{PathFile, PathFileError};
 use super::html;
+use super::learning_curve::CurvePoint;
 use super::models::Models;
 use super::report::{self, Provenance};
 use super::rows::{self, Row, RowWriter, RowsError};
@@ -119,12 +120,13 @@ impl Outputs {
     }
 
     /// Writes `rows.parquet`, `report.md` and `report.html`, where an output folder is wanted.
-    /// `cases` are the scenes of `rows`.
+    /// `cases` are the scenes of `rows`; `curve` may be empty.
     pub fn finish(
         self,
         title: &str,
         cases: &[Case],
         rows: &[Row],
+        curve: &[CurvePoint],
         provenance: &Provenance,
     ) -> Result<(), OutputError> {
         let Some(dir) = self.out else { return Ok(()) };
@@ -133,12 +135,12 @@ impl Outputs {
             let path = dir.join(name);
             write_whole(&path, text.as_bytes()).map_err(|error| OutputError::File { path, error })
         };
-        write("report.md", report::markdown(title, rows, provenance))?;
+        write("report.md", report::markdown(title, rows, curve, provenance))?;
         let shown = html::gallery::chosen(cases, rows);
         let scenes = shown.iter().map(|c| c.scene.name.as_str()).collect();
         let path = dir.join(TRACES);
         let traces =
             trace::read(&path, &scenes).map_err(|error| OutputError::File { path, error })?;
-        write("report.html", html::page(title, rows, provenance, &shown, &traces))
+        write("report.html", html::page(title, rows, curve, provenance, &shown, &traces))
     }
 }

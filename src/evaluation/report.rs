@@ -5,6 +5,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::Serialize;
 
+use super::learning_curve::{self, CurvePoint};
 use super::metrics;
 use super::rows::Row;
 use super::table;
@@ -93,8 +94,13 @@ pub fn text(rows: &[Row], seed: u64) -> String {
     out
 }
 
-/// The whole `report.md`.
-pub fn markdown(title: &str, rows: &[Row], provenance: &Provenance) -> String {
+/// The whole `report.md`; `curve` may be empty.
+pub fn markdown(
+    title: &str,
+    rows: &[Row],
+    curve: &[CurvePoint],
+    provenance: &Provenance,
+) -> String {
     let groups = metrics::summarise(rows, provenance.seed);
     let mut out = format!("# {title}\n\n- Command: `{}`\n", provenance.command);
     for (name, value) in provenance.facts() {
@@ -113,8 +119,17 @@ pub fn markdown(title: &str, rows: &[Row], provenance: &Provenance) -> String {
     } else {
         let _ = write!(out, "\n{}", failures.markdown());
     }
+    if !curve.is_empty() {
+        let _ = write!(out, "\n{}\n{CURVE_NOTE}", learning_curve::table(curve).markdown());
+    }
     out
 }
+
+/// How to read the learning curve.
+pub(super) const CURVE_NOTE: &str = "\
+Each line: models from a part of the data set, planning in generated scenes of all levels that \
+are neither trained on nor reported above. “Per cell” counts samples collected in each cell of \
+the grid, “samples” those solved.\n";
 
 /// How to read the tables: paragraphs of plain text, an empty line between two.
 pub(super) const NOTES: &str = "\
@@ -192,7 +207,7 @@ mod tests {
     fn the_report_names_machine_seed_and_every_failure() {
         let rows = [row("a", "ha-rs", 0.5, true), row("b", "ha-rs", 0.4, false)];
         let provenance = Provenance::here("2 made by hand".into(), 7, 100, 1);
-        let report = markdown("Test", &rows, &provenance);
+        let report = markdown("Test", &rows, &[], &provenance);
         for part in ["Machine: ", "intervals: 7", "1 of 2 solved", "| b | ha-rs | budget spent |"] {
             assert!(report.contains(part), "{part} not in\n{report}");
         }

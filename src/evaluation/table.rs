@@ -3,7 +3,7 @@
 //! The paper's numbers are in `paper_tables.csv` next to this file: section V of the
 //! paper, 100 scenes per level and type, times on the authors' machine.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::method::Method;
 use super::metrics::{Group, Interval, Summary};
@@ -11,7 +11,7 @@ use super::rows::Row;
 use crate::world::{Level, ParkingType};
 
 /// A table of text, ready to lay out.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Table {
     /// Its heading.
     pub title: String,

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::dataset::CollectConfig;
+use crate::dataset::{CollectConfig, Subset};
 use crate::evaluation::Method;
 use crate::evaluation::suite::MAX_COUNT;
 use crate::files::{TomlError, read_toml};
@@ -39,6 +39,9 @@ pub struct ExperimentConfig {
     /// The trainings.
     #[serde(default)]
     pub train: TrainConfig,
+    /// Whether, and how, to see how much data is enough.
+    #[serde(default)]
+    pub learning_curve: Option<LearningCurveConfig>,
     /// The evaluation.
     pub evaluate: EvaluateConfig,
 }
@@ -49,6 +52,48 @@ pub struct ExperimentConfig {
 pub struct TrainConfig {
     /// The networks, as in `n3p-train mlp --config`, without `seed`.
     pub mlp: MlpConfig,
+}
+
+/// Models from parts of the data set, planning in scenes that nothing else uses.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LearningCurveConfig {
+    /// Methods that plan with a model. Networks are trained only if one needs them.
+    pub methods: Vec<Method>,
+    /// Scenes per type and level.
+    pub count: usize,
+    /// Seed of the scenes, another one than the evaluation's.
+    pub seed: u64,
+    /// The parts of the data.
+    pub parts: Vec<Subset>,
+}
+
+impl LearningCurveConfig {
+    /// Whether some method needs the networks.
+    pub fn needs_mlp(&self) -> bool {
+        self.methods.contains(&Method::MlpN3p)
+    }
+
+    fn validate(&self, reported_seed: u64) -> Result<(), String> {
+        distinct("methods", &self.methods, |m| m.name())?;
+        if let Some(other) = self.methods.iter().find(|m| !m.needs_model()) {
+            return Err(format!("methods names {other}, which learns nothing; leave it out"));
+        }
+        if !(1..=MAX_COUNT).contains(&self.count) {
+            return Err(format!("count is {}; expected 1 to {MAX_COUNT}", self.count));
+        }
+        if self.seed == reported_seed {
+            return Err(format!(
+                "seed is {reported_seed}, that of the evaluation; choose another one, so that data \
+                 is not chosen by the scenes reported on"
+            ));
+        }
+        if self.parts.is_empty() {
+            return Err("parts is empty; expected at least one".to_owned());
+        }
+        let parts = self.parts.iter().enumerate();
+        parts.map(|(i, p)| p.validate().map_err(|e| format!("parts[{i}].{e}"))).collect()
+    }
 }
 
 /// Which methods run on which generated scenes.
@@ -146,6 +191,9 @@ impl ExperimentConfig {
         let e = &self.evaluate;
         e.planner.validate().map_err(|m| format!("evaluate.planner.{m}"))?;
         e.n3p.validate().map_err(|m| format!("evaluate.n3p.{m}"))?;
+        if let Some(curve) = &self.learning_curve {
+            curve.validate(e.seed).map_err(|m| format!("learning_curve.{m}"))?;
+        }
         distinct("evaluate.methods", &e.methods, |m| m.name())?;
         distinct("evaluate.types", &e.types, |t| t.name())?;
         distinct("evaluate.levels", &e.levels, |l| l.name())?;
@@ -162,7 +210,7 @@ impl ExperimentConfig {
 
     /// Whether some method needs a data set and models.
     pub fn learns(&self) -> bool {
-        self.evaluate.methods.iter().any(|m| m.needs_model())
+        self.learning_curve.is_some() || self.evaluate.methods.iter().any(|m| m.needs_model())
     }
 
     /// Whether some method needs the networks.
@@ -226,6 +274,12 @@ mod tests {
 
     #[test]
     fn refusals_name_the_field() {
+        let curve = |method, seed| {
+            format!(
+                "[learning_curve]\nmethods = [\"{method}\"]\ncount = 1\nseed = {seed}\n\
+                 parts = [{{ samples_per_cell = 2 }}]\n[evaluate]"
+            )
+        };
         for (change, expected) in [
             (("version = 1", "version = 2"), "version is 2"),
             (("\"a\"", "\"a/b\""), "name is"),
@@ -234,6 +288,8 @@ mod tests {
             (("\"n3p\"", "\"n4p\""), "unknown method"),
             (("\"n3p\"", "\"ha-rs\""), "twice"),
             (("[evaluate]", "[collect]\nseed = 1\n[evaluate]"), "collect.seed"),
+            (("[evaluate]", &curve("n3p", 3)), "learning_curve.seed is 3"),
+            (("[evaluate]", &curve("ha", 4)), "learning_curve.methods names ha"),
         ] {
             let message = read(&MINIMAL.replace(change.0, change.1)).unwrap_err().to_string();
             assert!(message.contains(expected) && message.contains("a.toml"), "{message}");

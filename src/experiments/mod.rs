@@ -4,7 +4,9 @@
 //! stage, and compares a rerun with the committed rows.
 
 pub mod config;
+mod learning_curve;
 pub mod runner;
+mod stages;
 
 pub use config::{ConfigError, ExperimentConfig};
-pub use runner::ExperimentError;
+pub use runner::{ExperimentError, Given};

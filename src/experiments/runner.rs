@@ -7,6 +7,7 @@
 //! | `config.toml`, `run.json` | every setting spelt out; the build; written first |
 //! | `dataset/` | the samples |
 //! | `models/` | `knn.bin`, `mlp-TYPE.safetensors` |
+//! | `learning-curve/` | points and models of each part of the data, where a curve is asked for |
 //! | `rows.csv`, `rows.parquet`, `report.md`, `report.html` | the evaluation |
 //! | `traces.jsonl` | its paths, for the report |
 //! | `stages/` | which stage was begun or finished, from which settings |
@@ -17,19 +18,22 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
-
 use super::config::ExperimentConfig;
+use super::learning_curve;
+use super::stages::{Failure, Stages, Todo, settings};
+use crate::dataset::manifest::manifest_path;
+use crate::dataset::read::read_metadata;
 use crate::dataset::schema::GIT_REVISION;
 use crate::dataset::{CollectError, CollectOptions, Dataset, DatasetError, collect};
 use crate::evaluation::report::Provenance;
 use crate::evaluation::rows::{Row, RowsError, read_csv};
 use crate::evaluation::suite;
 use crate::evaluation::{
-    MethodSettings, Models, ModelsError, OutputError, Outputs, SuiteConfig, SuiteError,
+    CurvePoint, MethodSettings, Models, ModelsError, OutputError, Outputs, SuiteConfig, SuiteError,
 };
 use crate::files::{reason, remove_leftovers, sha256_hex, write_whole};
 use crate::progress;
+use crate::selectors::artefact::ArtefactError;
 use crate::training::{self, TrainingError};
 use crate::world::ParkingType;
 
@@ -65,6 +69,27 @@ pub enum ExperimentError {
     /// Rows cannot be read.
     #[error(transparent)]
     Rows(#[from] RowsError),
+    /// The data set given cannot be used.
+    #[error("--data: {0}")]
+    GivenData(DatasetError),
+    /// The data set given is not the one that the experiment describes.
+    #[error(
+        "--data {path}: {field} is {found}, but the experiment's is {wanted}; give the data set \
+         collected with its settings, or none"
+    )]
+    OtherData {
+        /// The folder.
+        path: PathBuf,
+        /// The setting.
+        field: String,
+        /// Its value in the data set.
+        found: String,
+        /// Its value in the experiment.
+        wanted: String,
+    },
+    /// The models given cannot be used.
+    #[error("--models: {0}")]
+    GivenModels(ArtefactError),
     /// The worker threads could not be started.
     #[error("collect: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
@@ -75,6 +100,7 @@ impl ExperimentError {
     pub fn is_bad_input(&self) -> bool {
         match self {
             Self::Io { .. } | Self::Suite(_) => true,
+            Self::GivenData(_) | Self::OtherData { .. } | Self::GivenModels(_) => true,
             Self::Collect(e) => e.is_bad_input(),
             Self::Training(e) => e.is_bad_input(),
             _ => false,
@@ -82,40 +108,59 @@ impl ExperimentError {
     }
 }
 
+impl From<Failure> for ExperimentError {
+    fn from((path, error): Failure) -> Self {
+        Self::Io { path, error }
+    }
+}
+
+/// What an experiment takes as it is instead of making it.
+#[derive(Clone, Debug, Default)]
+pub struct Given {
+    /// Folder of the data set, collected with the experiment's settings.
+    pub data: Option<PathBuf>,
+    /// Folder of the models, with the names that [`run`] gives them. Nothing is collected or
+    /// trained, and no learning curve drawn.
+    pub models: Option<PathBuf>,
+}
+
 /// A run of an experiment into a folder.
 struct Runner<'a> {
     config: &'a ExperimentConfig,
+    given: &'a Given,
     out: &'a Path,
-}
-
-/// The record of a stage, `stages/NAME.json`.
-#[derive(PartialEq, Serialize, Deserialize)]
-struct Stage {
-    /// Over everything that decides the stage's output, builds aside.
-    settings_sha256: String,
-    /// The build that began it.
-    git_revision: String,
-    finished: bool,
-}
-
-/// What to do with a stage.
-#[derive(PartialEq)]
-enum Todo {
-    Nothing,
-    GoOn,
-    BeginAnew,
+    stages: Stages,
 }
 
 /// Runs `config` into the folder `out`, going on with what an earlier run left there.
 /// Returns the rows. Progress and what is skipped go to stderr.
-pub fn run(config: &ExperimentConfig, out: &Path) -> Result<Vec<Row>, ExperimentError> {
-    let runner = Runner { config, out };
-    runner.prepare()?;
-    if config.learns() {
-        runner.collect()?;
-        runner.train()?;
+pub fn run(
+    config: &ExperimentConfig,
+    given: &Given,
+    out: &Path,
+) -> Result<Vec<Row>, ExperimentError> {
+    let runner = Runner { config, given, out, stages: Stages::new(out) };
+    let mut curve = Vec::new();
+    // What the models come from.
+    let mut trained = String::new();
+    if let Some(folder) = given.models.as_ref().filter(|_| config.learns()) {
+        trained = runner.given_models(folder)?;
+        runner.prepare()?;
+    } else if config.learns() {
+        let given = given.data.as_ref().map(|folder| runner.given_data(folder)).transpose()?;
+        runner.prepare()?;
+        let data = match given {
+            Some(data) => data,
+            None => runner.collect()?,
+        };
+        let mut read = None;
+        runner.train(&data, &mut read)?;
+        curve = runner.learning_curve(&data, &mut read)?;
+        trained = settings((&data, &config.train));
+    } else {
+        runner.prepare()?;
     }
-    runner.evaluate()
+    runner.evaluate(&trained, &curve)
 }
 
 /// The differences between the rows of two runs, times aside; one line each.
@@ -174,42 +219,54 @@ impl Runner<'_> {
         write_whole(&path, text.as_bytes()).map_err(|error| ExperimentError::Io { path, error })
     }
 
-    /// Settings of the data set; every later stage's contain them.
+    /// Settings of the data set collected here; every later stage's contain them.
     fn collect_settings(&self) -> String {
         let c = self.config;
         settings(("collect", env!("CARGO_PKG_VERSION"), &c.collect, &c.evaluate.types))
     }
 
-    /// Compares a stage's record with `settings`, and records that it begins.
-    fn begin(&self, stage: &str, settings: &str) -> Result<Todo, ExperimentError> {
-        let record = std::fs::read(self.path(&format!("stages/{stage}.json")))
-            .ok()
-            .and_then(|bytes| serde_json::from_slice::<Stage>(&bytes).ok())
-            .filter(|s| s.settings_sha256 == settings);
-        let todo = match record {
-            Some(s) if s.finished => Todo::Nothing,
-            Some(s) if s.git_revision == GIT_REVISION => Todo::GoOn,
-            _ => Todo::BeginAnew,
-        };
-        match todo {
-            Todo::Nothing => tracing::info!("{stage}: finished before, nothing to do"),
-            _ => self.record(stage, settings, false)?,
+    /// Checks that the data set in `folder` is the experiment's; what identifies it.
+    fn given_data(&self, folder: &Path) -> Result<String, ExperimentError> {
+        let found = read_metadata(folder).map_err(ExperimentError::GivenData)?;
+        let wanted = self.config.collect.metadata();
+        if let Some(d) = found.settings_difference(&wanted) {
+            let (path, field, found, wanted) = (folder.to_owned(), d.field, d.stored, d.current);
+            return Err(ExperimentError::OtherData { path, field, found, wanted });
         }
-        Ok(todo)
+        let mut parts = Vec::new();
+        for &kind in &self.config.evaluate.types {
+            let missing = |_| {
+                let path = folder.to_owned();
+                ExperimentError::GivenData(DatasetError::Incomplete { path, kind })
+            };
+            parts.push(std::fs::read(manifest_path(folder, kind)).map_err(missing)?);
+        }
+        let parts: Vec<&[u8]> = parts.iter().map(Vec::as_slice).collect();
+        Ok(settings(("given", sha256_hex(&parts))))
     }
 
-    fn record(&self, stage: &str, settings: &str, finished: bool) -> Result<(), ExperimentError> {
-        let (settings_sha256, git_revision) = (settings.to_owned(), GIT_REVISION.to_owned());
-        let record = Stage { settings_sha256, git_revision, finished };
-        let json = serde_json::to_string_pretty(&record).expect("plain data");
-        self.write(&format!("stages/{stage}.json"), json + "\n")
+    /// Checks that the models in `folder` can be loaded; what identifies them.
+    fn given_models(&self, folder: &Path) -> Result<String, ExperimentError> {
+        let files = self.model_files(folder);
+        Models::load(&files).map_err(|error| match error {
+            ModelsError::Load(error) => ExperimentError::GivenModels(error),
+            error => error.into(),
+        })?;
+        let mut sums = Vec::new();
+        for path in files {
+            let bytes =
+                std::fs::read(&path).map_err(|error| ExperimentError::Io { path, error })?;
+            sums.push(sha256_hex(&[&bytes]));
+        }
+        Ok(settings(("models", sums)))
     }
 
-    fn collect(&self) -> Result<(), ExperimentError> {
+    /// Collects the data set; what identifies it.
+    fn collect(&self) -> Result<String, ExperimentError> {
         let settings = self.collect_settings();
         let folder = self.path("dataset");
-        match self.begin("collect", &settings)? {
-            Todo::Nothing if folder.exists() => return Ok(()),
+        match self.stages.begin("collect", &settings)? {
+            Todo::Nothing if folder.exists() => return Ok(settings),
             Todo::GoOn => {}
             _ => remove(&folder)?,
         }
@@ -224,19 +281,19 @@ impl Runner<'_> {
         for r in &reports {
             tracing::info!("collect: {}: {} of {} samples solved", r.kind, r.solved, r.rows);
         }
-        self.record("collect", &settings, true)
+        self.stages.finish("collect", &settings)?;
+        Ok(settings)
     }
 
-    fn train(&self) -> Result<(), ExperimentError> {
-        let data = self.collect_settings();
+    /// Trains from the data set that `data` identifies.
+    fn train(&self, data: &str, read: &mut Option<Dataset>) -> Result<(), ExperimentError> {
         let kinds = &self.config.evaluate.types;
-        let mut read = None;
         let knn = self.model("knn.bin");
-        let knn_settings = settings(("knn", &data));
-        if self.begin("train-knn", &knn_settings)? != Todo::Nothing || !knn.exists() {
-            let set = self.dataset(&mut read)?;
+        let knn_settings = settings(("knn", data));
+        if self.stages.begin("train-knn", &knn_settings)? != Todo::Nothing || !knn.exists() {
+            let set = self.dataset(read)?;
             training::knn::train(&set.metadata, &set.samples, kinds, &knn)?;
-            self.record("train-knn", &knn_settings, true)?;
+            self.stages.finish("train-knn", &knn_settings)?;
         }
         if !self.config.needs_mlp() {
             return Ok(());
@@ -244,48 +301,95 @@ impl Runner<'_> {
         for &kind in kinds {
             let (stage, out) = (format!("train-mlp-{kind}"), self.mlp_model(kind));
             let mlp = &self.config.train.mlp;
-            let mlp_settings = settings((&stage, &data, mlp));
-            if self.begin(&stage, &mlp_settings)? == Todo::Nothing && out.exists() {
+            let mlp_settings = settings((&stage, data, mlp));
+            if self.stages.begin(&stage, &mlp_settings)? == Todo::Nothing && out.exists() {
                 continue;
             }
-            let set = self.dataset(&mut read)?;
+            let set = self.dataset(read)?;
             let log = training::mlp::train(&set.metadata, &set.samples, kind, mlp, &out)?;
             tracing::info!(
-                "{stage}: best of {} epochs is {}, median error {:.2} m on unseen cells",
+                "{stage}: best of {} epochs is {}, median error {:.2} m on unseen rows",
                 log.losses.len(),
                 log.best_epoch,
                 log.validation.position_median_m
             );
-            self.record(&stage, &mlp_settings, true)?;
+            self.stages.finish(&stage, &mlp_settings)?;
         }
         Ok(())
+    }
+
+    /// The points of the learning curve, if the experiment wants one.
+    fn learning_curve(
+        &self,
+        data: &str,
+        read: &mut Option<Dataset>,
+    ) -> Result<Vec<CurvePoint>, ExperimentError> {
+        let Some(curve) = &self.config.learning_curve else { return Ok(Vec::new()) };
+        let mut points = Vec::new();
+        for (i, part) in curve.parts.iter().enumerate() {
+            let stage = format!("learning-curve-{i}");
+            let folder = self.path(&format!("learning-curve/{i}"));
+            let file = folder.join("points.json");
+            let (c, e) = (self.config, &self.config.evaluate);
+            let scenes = (&curve.methods, curve.count, curve.seed, &c.vehicle);
+            let planning = (&e.types, &e.levels, e.max_expansions, &e.planner, &e.n3p);
+            let settings = settings((&stage, data, part, scenes, planning, &c.train));
+            let done = self.stages.begin(&stage, &settings)? == Todo::Nothing;
+            let known = std::fs::read(&file).ok().filter(|_| done);
+            let known = known.and_then(|j| serde_json::from_slice::<Vec<CurvePoint>>(&j).ok());
+            if let Some(known) = known {
+                points.extend(known);
+                continue;
+            }
+            tracing::info!("{stage}: part {} of {}", i + 1, curve.parts.len());
+            std::fs::create_dir_all(&folder)
+                .map_err(|error| ExperimentError::Io { path: folder.clone(), error })?;
+            let new = learning_curve::points(c, curve, self.dataset(read)?, part, &folder)?;
+            let json = serde_json::to_string_pretty(&new).expect("plain data") + "\n";
+            write_whole(&file, json.as_bytes())
+                .map_err(|error| ExperimentError::Io { path: file, error })?;
+            self.stages.finish(&stage, &settings)?;
+            points.extend(new);
+        }
+        Ok(points)
     }
 
     /// The data set, read at most once.
     fn dataset<'d>(&self, read: &'d mut Option<Dataset>) -> Result<&'d Dataset, ExperimentError> {
         if read.is_none() {
-            *read = Some(Dataset::read(&self.path("dataset"), None)?);
+            *read = Some(match &self.given.data {
+                Some(folder) => Dataset::read(folder, None).map_err(ExperimentError::GivenData)?,
+                None => Dataset::read(&self.path("dataset"), None)?,
+            });
         }
         Ok(read.as_ref().expect("just read"))
     }
 
-    fn models(&self) -> Result<Models, ExperimentError> {
+    /// The files of the models that the evaluation needs, in `folder`.
+    fn model_files(&self, folder: &Path) -> Vec<PathBuf> {
         let mut files = Vec::new();
         if self.config.learns() {
-            files.push(self.model("knn.bin"));
+            files.push(folder.join("knn.bin"));
         }
         if self.config.needs_mlp() {
-            files.extend(self.config.evaluate.types.iter().map(|&kind| self.mlp_model(kind)));
+            let network = |kind| folder.join(format!("mlp-{kind}.safetensors"));
+            files.extend(self.config.evaluate.types.iter().map(network));
         }
-        Ok(Models::load(&files)?)
+        files
     }
 
-    fn evaluate(&self) -> Result<Vec<Row>, ExperimentError> {
+    fn models(&self) -> Result<Models, ExperimentError> {
+        let made = self.path("models");
+        let folder = self.given.models.as_ref().unwrap_or(&made);
+        Ok(Models::load(&self.model_files(folder))?)
+    }
+
+    /// Runs the methods with the models that `trained` identifies.
+    fn evaluate(&self, trained: &str, curve: &[CurvePoint]) -> Result<Vec<Row>, ExperimentError> {
         let e = &self.config.evaluate;
-        let trained = settings((self.collect_settings(), &self.config.train));
         let settings = settings(("evaluate", trained, &self.config.vehicle, e));
         let rows_csv = self.path("rows.csv");
-        match self.begin("evaluate", &settings)? {
+        match self.stages.begin("evaluate", &settings)? {
             Todo::Nothing if rows_csv.exists() => return Ok(read_csv(&rows_csv)?),
             Todo::GoOn => {}
             _ => remove(&rows_csv)?,
@@ -318,16 +422,10 @@ impl Runner<'_> {
         );
         let provenance = Provenance::here(scenes, e.seed, e.max_expansions, 1);
         let title = format!("Experiment {}", self.config.name);
-        outputs.finish(&title, &cases, &rows, &provenance)?;
-        self.record("evaluate", &settings, true)?;
+        outputs.finish(&title, &cases, &rows, curve, &provenance)?;
+        self.stages.finish("evaluate", &settings)?;
         Ok(rows)
     }
-}
-
-/// A checksum over settings.
-fn settings(parts: impl Serialize) -> String {
-    let json = serde_json::to_vec(&parts).expect("settings are plain values");
-    sha256_hex(&[&json])
 }
 
 fn remove(path: &Path) -> Result<(), ExperimentError> {

@@ -4,6 +4,7 @@
 //! and `gallery.js`. This module fills in what the template names: `tables`, `plots`
 //! (SVG, so that both can be read without scripts) and the data of the [`gallery`].
 
+mod curve;
 pub mod gallery;
 mod plots;
 mod tables;
@@ -15,10 +16,12 @@ use minijinja::{Environment, UndefinedBehavior};
 use serde::Serialize;
 
 use super::episode::Case;
+use super::learning_curve::{self, CurvePoint};
 use super::method::Method;
 use super::metrics;
-use super::report::{NOTES, Provenance};
+use super::report::{CURVE_NOTE, NOTES, Provenance};
 use super::rows::Row;
+use super::table::Table;
 use super::trace::Trace;
 use gallery::Gallery;
 
@@ -40,6 +43,9 @@ struct Page<'a> {
     time_plot: Vec<plots::PanelView>,
     node_plot: Vec<plots::PanelView>,
     dots: usize,
+    curve: Vec<curve::CurveView>,
+    curve_table: Option<Table>,
+    curve_note: &'static str,
     failures: Vec<tables::Failure>,
     notes: Vec<&'static str>,
     first: usize,
@@ -50,10 +56,11 @@ struct Page<'a> {
     scripts: Vec<&'static str>,
 }
 
-/// The page of a run. `shown` are the [`gallery::chosen`] cases, `traces` theirs.
+/// The page of a run. `curve` may be empty; `shown` are the [`gallery::chosen`] cases, `traces` theirs.
 pub fn page(
     title: &str,
     rows: &[Row],
+    curve: &[CurvePoint],
     provenance: &Provenance,
     shown: &[&Case],
     traces: &[Trace],
@@ -83,6 +90,9 @@ pub fn page(
         time_plot: plots::times(&groups, &methods, rows).panels(),
         node_plot: plots::nodes(&groups, &methods, rows).panels(),
         dots: plots::DOTS,
+        curve: curve::panels(curve),
+        curve_table: (!curve.is_empty()).then(|| learning_curve::table(curve)),
+        curve_note: CURVE_NOTE,
         failures,
         notes: NOTES.trim().split("\n\n").collect(),
         first: gallery::FIRST,
@@ -152,7 +162,7 @@ mod tests {
 
     fn whole_page(cases: &[Case], rows: &[Row], traces: &[Trace]) -> String {
         let provenance = Provenance::here("by hand".into(), 7, 100, 1);
-        page("A & B", rows, &provenance, &gallery::chosen(cases, rows), traces)
+        page("A & B", rows, &[], &provenance, &gallery::chosen(cases, rows), traces)
     }
 
     /// The text between `before` and `after`.

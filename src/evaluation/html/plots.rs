@@ -390,7 +390,7 @@ fn times_faster(decade: i32) -> String {
 }
 
 /// A coordinate to a tenth.
-fn num(v: f64) -> String {
+pub(super) fn num(v: f64) -> String {
     ((v * 10.0).round() / 10.0 + 0.0).to_string()
 }
 
