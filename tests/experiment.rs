@@ -59,7 +59,8 @@ fn runs_goes_on_and_reproduces() {
     experiment(dir.path(), &["run", "tiny.toml"]).success().stdout(contains("rows"));
     let results = dir.path().join("results/tiny");
     let files = ["config.toml", "run.json", "rows.parquet", "report.md", "report.html"];
-    for file in files.into_iter().chain(["models/knn.bin"]) {
+    let models = ["models/knn.bin", "models/knn.card.md", "models/mlp-reverse.card.md"];
+    for file in files.into_iter().chain(models) {
         assert!(results.join(file).exists(), "{file}");
     }
     let report = std::fs::read_to_string(results.join("report.md")).unwrap();

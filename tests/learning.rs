@@ -213,10 +213,14 @@ fn one_file_holds_all_types_and_the_same_input_gives_the_same_bytes() {
         ParkingType::ALL.iter().flat_map(|k| samples(*k, &[0, 1], 20, 5)).collect();
     let knn = knn_of(&all, &ParkingType::ALL, dir.path());
     assert_eq!(knn.kinds(), ParkingType::ALL);
-    let bytes = std::fs::read(knn.path()).unwrap();
+    let files = || {
+        let paths = [knn.path().to_owned(), training::log_path(knn.path())];
+        (paths.map(|path| std::fs::read(path).unwrap()), card(knn.path()))
+    };
+    let before = files();
     all.reverse();
     knn_of(&all, &ParkingType::ALL, dir.path());
-    assert!(bytes == std::fs::read(knn.path()).unwrap(), "the order of rows must not matter");
+    assert!(before == files(), "the order of rows must not matter");
     let error = training::knn::train(
         &metadata(),
         &samples(KIND, &[0], 5, 1),
@@ -256,13 +260,78 @@ fn mlp_learns_a_smooth_mapping_reproducibly() {
         assert!(std::fs::read(&path).unwrap() == std::fs::read(&again).unwrap(), "same bytes");
         let reach = log.reach;
         assert!(reach.rows > 0 && reach.direct <= reach.to_goal && reach.to_goal <= 1.0);
-        for extension in ["training.json", "training.svg"] {
-            assert!(path.with_extension(extension).exists());
-        }
+        assert!(path.with_extension("training.svg").exists());
     }
-    let log = std::fs::read(training::mlp::log_path(&dir.path().join("again.safetensors")));
+    let log = std::fs::read(training::log_path(&dir.path().join("again.safetensors")));
     let log: training::mlp::TrainingLog = serde_json::from_slice(&log.unwrap()).unwrap();
     assert_eq!(log.config.loss, Loss::Huber);
+}
+
+fn card(model: &Path) -> String {
+    std::fs::read_to_string(training::card_path(model)).unwrap()
+}
+
+#[test]
+fn every_model_gets_a_card_of_the_same_bytes() {
+    let all = samples(KIND, &[0, 3, 7, 11], 30, 2);
+    let trained = || {
+        let dir = tempfile::tempdir().unwrap();
+        let knn = knn_of(&all, &[KIND], dir.path());
+        let mlp = dir.path().join("mlp-parallel.safetensors");
+        train_mlp(&all, &quick(3), &mlp);
+        (dir, knn, mlp)
+    };
+    let [(dir, knn, mlp), (_other, knn_again, mlp_again)] = [trained(), trained()];
+    for (path, again) in [(knn.path(), knn_again.path()), (&mlp, &mlp_again)] {
+        let card = card(path);
+        assert_eq!(card, self::card(again), "same samples, settings and seed");
+        let folder = dir.path().to_str().unwrap();
+        assert!(!card.contains(folder), "no path of this machine: {card}");
+    }
+    let hash = &knn.file().header().data_sha256;
+    let mlp_hash = &MlpSelector::load(&mlp).unwrap().headers().next().unwrap().data_sha256.clone();
+    assert!(card(knn.path()).contains(hash) && card(&mlp).contains(mlp_hash));
+    for text in [card(knn.path()), card(&mlp)] {
+        assert!(text.contains("| parallel | 12 | 124 | 120 (96.8 %) |"), "{text}");
+        assert!(text.contains("| Seed | 7 |"), "{text}");
+    }
+    assert!(card(&mlp).contains("| Seed | 11 ("), "of the training");
+    let (_, link) =
+        card(&mlp).split_once("](<").map(|(a, b)| (a.to_owned(), b.to_owned())).unwrap();
+    assert!(dir.path().join(link.split_once(">)").unwrap().0).exists(), "the curve is there");
+    let reseeded = MlpConfig { seed: 12, ..quick(3) };
+    train_mlp(&all, &reseeded, &mlp);
+    assert_ne!(card(&mlp), card(&mlp_again));
+}
+
+#[test]
+fn knn_leaves_a_log_with_what_neighbours_answer() {
+    let dir = tempfile::tempdir().unwrap();
+    let all = samples(KIND, &[0, 5, 11], 40, 3);
+    let knn = knn_of(&all, &[KIND], dir.path());
+    let log = std::fs::read(training::log_path(knn.path())).unwrap();
+    let log: training::knn::KnnLog = serde_json::from_slice(&log).unwrap();
+    let header = knn.file().header();
+    assert_eq!((&log.data_sha256, log.seed), (&header.data_sha256, header.seed));
+    assert_eq!(log.heading_radius, header.heading_radius);
+    assert_eq!(log.bytes as u64, std::fs::metadata(knn.path()).unwrap().len());
+    let kind = &log.kinds[0];
+    assert_eq!((kind.rows, kind.samples, kind.occupied_cells), (123, 120, 3));
+
+    // The model itself answers a stored start with the sample, then with its neighbours.
+    let solved: Vec<_> = all.iter().filter(|s| s.status == Status::Solved).collect();
+    let mut distances: Vec<f64> = (0..solved.len())
+        .map(|i| {
+            let near = knn.nearest(&Features::new(solved[i].start, solved[i].cell), 2);
+            let other = near.iter().find(|n| n.sample != i).unwrap();
+            knn.file().preparatory(0, other.sample).distance(solved[i].rs_start)
+        })
+        .collect();
+    distances.sort_by(f64::total_cmp);
+    let errors = kind.leave_one_out.unwrap().errors;
+    let mean = distances.iter().sum::<f64>() / distances.len() as f64;
+    assert!(mean > 0.01 && (errors.position_mean_m - mean).abs() < 1e-5, "{errors:?} {mean}");
+    assert!((errors.position_p95_m - distances[113]).abs() < 1e-5, "{errors:?}");
 }
 
 /// The network as candle computes it from the same file.

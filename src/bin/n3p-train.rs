@@ -22,10 +22,12 @@ struct Cli {
 enum Command {
     /// Trains the network of one parking type, or of every type of the data set
     ///
-    /// May be interrupted at any moment: the best network so far is in its file. A training
-    /// log and the loss curve are written beside it.
+    /// May be interrupted at any moment: the best network so far is in its file. A model card,
+    /// a training log and the loss curve are written beside it.
     Mlp(MlpArgs),
     /// Stores the solved samples of one or all types for nearest-neighbour queries
+    ///
+    /// A model card and a training log are written beside the model.
     Knn(KnnArgs),
 }
 
@@ -117,13 +119,14 @@ fn mlp(args: &MlpArgs) -> anyhow::Result<ExitCode> {
 fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
     artefact::check_writable(&args.out).or_bad_input()?;
     let (data, kinds) = read(&args.common)?;
-    let report = training::knn::train(&data.metadata, &data.samples, &kinds, &args.out)
+    let log = training::knn::train(&data.metadata, &data.samples, &kinds, &args.out)
         .map_err(|e| exit_code(e, &args.common.data))?;
-    for (kind, samples, cells, manoeuvres) in &report.kinds {
-        let text = format!("{kind}: {samples} samples in {cells} cells, {manoeuvres} manoeuvres");
-        cli::print(text)?;
+    for training::knn::KnnKindLog { kind, samples, occupied_cells, manoeuvres, .. } in &log.kinds {
+        cli::print(format!(
+            "{kind}: {samples} samples in {occupied_cells} cells, {manoeuvres} manoeuvres"
+        ))?;
     }
-    let size = report.bytes as f64 / f64::from(1 << 20);
+    let size = log.bytes as f64 / f64::from(1 << 20);
     cli::print(format!("{}: {size:.2} MiB", args.out.display()))?;
     Ok(ExitCode::SUCCESS)
 }

@@ -6,7 +6,7 @@
 //! |---|---|
 //! | `config.toml`, `run.json` | every setting spelt out; the build; written first |
 //! | `dataset/` | the samples |
-//! | `models/` | `knn.bin`, `mlp-TYPE.safetensors` |
+//! | `models/` | `knn.bin`, `mlp-TYPE.safetensors`, their cards and logs |
 //! | `learning-curve/` | points and models of each part of the data, where a curve is asked for |
 //! | `rows.csv`, `rows.parquet`, `report.md`, `report.html` | the evaluation |
 //! | `traces.jsonl` | its paths, for the report |

@@ -10,7 +10,7 @@
 
 use std::collections::BTreeSet;
 use std::num::NonZero;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use candle_core::{DType, Device, Tensor, Var};
 use rand::RngExt;
@@ -19,10 +19,11 @@ use serde::{Deserialize, Serialize};
 
 use super::curve::{self, EpochLoss};
 use super::optimiser::AdamW;
+use super::quality::{Errors, Reach, errors, reach};
 use super::targets::{self, Example};
-use super::{Loss, MlpConfig, TrainingError, Validation, solved};
+use super::{Loss, MlpConfig, TrainingError, Validation, card, solved, write_beside};
 use crate::dataset::{Metadata, Sample, content_sha256, validation_cells};
-use crate::geometry::{Pose, signed_angle};
+use crate::geometry::Pose;
 use crate::progress;
 use crate::rng::{Stream, rng};
 use crate::selectors::artefact;
@@ -35,25 +36,6 @@ use crate::world::ParkingType;
 
 /// Fewest solved samples worth training on.
 const LEAST_SAMPLES: usize = 10;
-
-/// How far predictions lie from the preparatory poses wanted in the validation rows.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Errors {
-    /// Mean distance, metres.
-    pub position_mean_m: f64,
-    /// Median distance, metres.
-    pub position_median_m: f64,
-    /// 95th percentile of the distance, metres.
-    pub position_p95_m: f64,
-    /// Mean difference of the headings, radians.
-    pub heading_mean_rad: f64,
-    /// Median difference of the headings, radians.
-    pub heading_median_rad: f64,
-    /// 95th percentile of the difference of the headings, radians.
-    pub heading_p95_rad: f64,
-}
-
-pub use super::targets::Reach;
 
 /// The training's log, written as JSON beside the model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -78,8 +60,8 @@ pub struct TrainingLog {
     pub reach: Reach,
 }
 
-/// Trains a network of `kind` and writes it to `out`, with `.training.json` and
-/// `.training.svg` in place of the extension beside it.
+/// Trains a network of `kind` and writes it to `out`, with its log, its model card and the
+/// loss curve (`.training.svg`) beside it.
 pub fn train(
     metadata: &Metadata,
     samples: &[Sample],
@@ -129,8 +111,9 @@ pub fn train(
         losses: Vec::new(),
         best_epoch: 0,
         validation: errors(&first, &validation),
-        reach: targets::reach(metadata, &validation, &first),
+        reach: reach(metadata, &validation, &first),
     };
+    let rows = samples.iter().filter(|s| s.cell.kind == kind).count();
     let mut best = f32::INFINITY;
     let mut order: Vec<usize> = (0..train.len()).collect();
     let bar = progress::bar(config.epochs as u64, kind.name());
@@ -151,9 +134,9 @@ pub fn train(
             log.best_epoch = epoch + 1;
             let predicted = predictions(&model, &validation_rows, &header)?;
             log.validation = errors(&predicted, &validation);
-            log.reach = targets::reach(metadata, &validation, &predicted);
+            log.reach = reach(metadata, &validation, &predicted);
             artefact::write(out, &mlp::encode(&header, &model.weights()?))?;
-            write_log(&log, out)?;
+            write_beside(out, &log, card::mlp(out, metadata, rows, &log))?;
         }
         let (median, direct) = (log.validation.position_median_m, 100.0 * log.reach.direct);
         bar.set_message(format!(
@@ -167,21 +150,10 @@ pub fn train(
         }
     }
     bar.finish_and_clear();
-    write_log(&log, out)?;
+    write_beside(out, &log, card::mlp(out, metadata, rows, &log))?;
     let picture = curve::svg(&format!("mlp, {kind}: loss"), &log.losses)?;
     artefact::write(&out.with_extension("training.svg"), picture.as_bytes())?;
     Ok(log)
-}
-
-/// The file of the training log of the model `out`.
-pub fn log_path(out: &Path) -> PathBuf {
-    out.with_extension("training.json")
-}
-
-fn write_log(log: &TrainingLog, out: &Path) -> Result<(), TrainingError> {
-    let mut text = serde_json::to_string_pretty(log).expect("a log is plain data");
-    text.push('\n');
-    Ok(artefact::write(&log_path(out), text.as_bytes())?)
 }
 
 fn features(example: &Example) -> [f32; Features::COUNT] {
@@ -355,23 +327,4 @@ fn predictions(
         Ok(())
     })?;
     Ok(predicted)
-}
-
-fn errors(predicted: &[Pose], examples: &[Example]) -> Errors {
-    let pairs = || predicted.iter().zip(examples);
-    let mut positions: Vec<f64> = pairs().map(|(p, e)| p.distance(e.target)).collect();
-    let mut headings: Vec<f64> =
-        pairs().map(|(p, e)| signed_angle(p.heading, e.target.heading).abs()).collect();
-    positions.sort_by(f64::total_cmp);
-    headings.sort_by(f64::total_cmp);
-    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
-    let quantile = |v: &[f64], q: f64| v[((v.len() - 1) as f64 * q).round() as usize];
-    Errors {
-        position_mean_m: mean(&positions),
-        position_median_m: quantile(&positions, 0.5),
-        position_p95_m: quantile(&positions, 0.95),
-        heading_mean_rad: mean(&headings),
-        heading_median_rad: quantile(&headings, 0.5),
-        heading_p95_rad: quantile(&headings, 0.95),
-    }
 }

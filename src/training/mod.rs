@@ -1,22 +1,31 @@
 //! Rows of a data set → model files.
 //!
-//! [`knn`] stores samples and a [`library`] of their manoeuvres; [`mlp`] trains a network, with [`optimiser`] and [`curve`] as its
-//! helpers. Both take samples and metadata of one data set and write an artefact that
-//! [`crate::selectors`] loads.
+//! [`knn`] stores samples and a [`library`] of their manoeuvres; [`mlp`] trains a network, with
+//! [`optimiser`] and [`curve`] as its helpers. Both take samples and metadata of one data set
+//! and write an artefact that [`crate::selectors`] loads. Beside it they leave what programs
+//! and people want to know of it: a log ([`log_path`]), with its [`quality`], and a model card
+//! ([`card_path`]).
 
+mod card;
 pub mod curve;
 pub mod knn;
+mod leave_one_out;
 pub mod library;
 pub mod mlp;
 mod mlp_config;
 pub mod optimiser;
+pub mod quality;
 mod targets;
 
 pub use mlp_config::{Loss, MlpConfig, Schedule, Targets, Validation};
 
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
 use crate::dataset::{Sample, Status};
 use crate::files::TomlError;
-use crate::selectors::artefact::ArtefactError;
+use crate::selectors::artefact::{self, ArtefactError};
 use crate::world::ParkingType;
 
 /// A training that cannot start or go on.
@@ -54,7 +63,7 @@ pub enum TrainingError {
     #[error("{}: {problem}", .path.display())]
     ConfigFile {
         /// The file.
-        path: std::path::PathBuf,
+        path: PathBuf,
         /// What is wrong.
         problem: String,
     },
@@ -104,6 +113,24 @@ pub fn single_threaded() {
         // SAFETY: the documented contract, no other thread is running yet.
         unsafe { std::env::set_var(THREADS, "1") };
     }
+}
+
+/// The training log of the model `out`: `.training.json` in place of its extension.
+pub fn log_path(out: &Path) -> PathBuf {
+    out.with_extension("training.json")
+}
+
+/// The model card of the model `out`: `.card.md` in place of its extension.
+pub fn card_path(out: &Path) -> PathBuf {
+    out.with_extension("card.md")
+}
+
+/// Writes log and card of the model `out`.
+fn write_beside(out: &Path, log: &impl Serialize, card: String) -> Result<(), TrainingError> {
+    let mut json = serde_json::to_string_pretty(log).expect("a log is plain data");
+    json.push('\n');
+    artefact::write(&log_path(out), json.as_bytes())?;
+    Ok(artefact::write(&card_path(out), card.as_bytes())?)
 }
 
 /// The solved samples of a type, by cell and then by index, whatever the order of `samples`.

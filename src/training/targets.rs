@@ -23,7 +23,6 @@ use indicatif::ProgressBar;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use super::{MlpConfig, Targets};
 use crate::dataset::{Metadata, Sample};
@@ -131,7 +130,8 @@ fn retarget(rows: &mut [Example], pose: Pose, metadata: &Metadata, config: &MlpC
 }
 
 impl Example {
-    fn stored(s: &Sample) -> Self {
+    /// The sample with its own pose.
+    pub fn stored(s: &Sample) -> Self {
         Self {
             cell: s.cell,
             cell_index: s.cell_index,
@@ -140,43 +140,6 @@ impl Example {
             target: s.rs_start,
         }
     }
-}
-
-/// Shares of predicted poses that spare a search, in their cells and the lane behind.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Reach {
-    /// Predictions looked at.
-    pub rows: usize,
-    /// One free curve (and a straight) leads from the pose into the spot.
-    pub to_goal: f64,
-    /// And one leads from the start to the pose: two curves are the whole plan.
-    pub direct: f64,
-    /// The same where the wanted pose is taken instead of the predicted one.
-    pub wanted_direct: f64,
-}
-
-/// Judges `predicted`, the poses of `examples`; of many rows some, evenly spread.
-pub(super) fn reach(metadata: &Metadata, examples: &[Example], predicted: &[Pose]) -> Reach {
-    const MOST: usize = 1000;
-    let mut planner = HybridAStar::new(metadata.planner);
-    let mut counts = [0_usize; 3];
-    let rows = examples.len().min(MOST);
-    for i in (0..rows).map(|i| i * examples.len() / rows) {
-        let (e, predicted) = (&examples[i], predicted[i]);
-        let back = (-metadata.grid.back - e.start.x).max(0.0);
-        let Some(world) = CellWorld::new(metadata, &e.cell, back) else { continue };
-        let mut judge = |pose: Pose| {
-            let finish = pose.is_finite() && world.finish(&mut planner, pose).is_some();
-            [finish, finish && world.approach_is_direct(&mut planner, e.start, pose)]
-        };
-        let [finish, direct] = judge(predicted);
-        let [_, wanted] = judge(e.target);
-        for (count, yes) in counts.iter_mut().zip([finish, direct, wanted]) {
-            *count += usize::from(yes);
-        }
-    }
-    let [to_goal, direct, wanted_direct] = counts.map(|c| c as f64 / rows.max(1) as f64);
-    Reach { rows, to_goal, direct, wanted_direct }
 }
 
 /// A cell ready to be planned in.
@@ -440,6 +403,7 @@ fn neighbours(grid: &Grid, cell: &Cell, index: u32) -> impl Iterator<Item = u32>
 
 #[cfg(test)]
 mod tests {
+    use super::super::quality::reach;
     use super::*;
     use crate::dataset::sampler::Sampler;
     use crate::dataset::{CollectConfig, Status};
@@ -484,7 +448,7 @@ mod tests {
         assert!(behind >= rows.iter().filter(|e| e.sample_index % 2 == 1).count(), "{behind}");
         let wanted: Vec<Pose> = rows.iter().map(|e| e.target).collect();
         let got = reach(&metadata, &rows, &wanted);
-        assert_eq!((got.rows, got.to_goal), (rows.len(), 1.0));
+        assert_eq!((got.rows, got.to_goal, got.wanted_to_goal), (rows.len(), 1.0, 1.0));
         assert!(got.direct > 0.8 && got.direct == got.wanted_direct, "{got:?}");
         // Neighbours are drawn together.
         let (first, last) = (wanted[0], wanted[wanted.len() - 1]);
