@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput};
-use n3p::dataset::{self, CollectConfig, CollectOptions, Part, TypeReport};
+use n3p::dataset::{self, CollectConfig, CollectOptions, Dataset, Part, TypeReport};
 use n3p::progress;
 use n3p::world::ParkingType;
 
@@ -61,6 +61,20 @@ fn run(args: &Args) -> anyhow::Result<ExitCode> {
         cli::print(summary(report))?;
     }
     cli::print(format!("{}: {seconds:.1} s", args.out.display()))?;
+    if reports.iter().all(|r| r.missing_shards == 0) {
+        // Read back: what is on the disk counts.
+        let mut samples = Vec::new();
+        let mut metadata = None;
+        for &kind in &kinds {
+            let data = Dataset::read(&args.out, Some(kind))?;
+            samples.extend(data.samples);
+            metadata = Some(data.metadata);
+        }
+        if let Some(metadata) = metadata {
+            let sum = dataset::content_sha256(&metadata, &samples);
+            cli::print(format!("checksum of settings and rows: {sum}"))?;
+        }
+    }
     Ok(ExitCode::SUCCESS)
 }
 
