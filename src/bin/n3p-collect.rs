@@ -63,17 +63,8 @@ fn run(args: &Args) -> anyhow::Result<ExitCode> {
     cli::print(format!("{}: {seconds:.1} s", args.out.display()))?;
     if reports.iter().all(|r| r.missing_shards == 0) {
         // Read back: what is on the disk counts.
-        let mut samples = Vec::new();
-        let mut metadata = None;
-        for &kind in &kinds {
-            let data = Dataset::read(&args.out, Some(kind))?;
-            samples.extend(data.samples);
-            metadata = Some(data.metadata);
-        }
-        if let Some(metadata) = metadata {
-            let sum = dataset::content_sha256(&metadata, &samples);
-            cli::print(format!("checksum of settings and rows: {sum}"))?;
-        }
+        let data = Dataset::read_types(&args.out, &kinds)?;
+        cli::print(format!("checksum of settings and rows: {}", data.content_sha256(&kinds)))?;
     }
     Ok(ExitCode::SUCCESS)
 }

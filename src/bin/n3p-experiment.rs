@@ -86,7 +86,7 @@ fn run(file: &Path, out: Option<&Path>, given: &Given) -> Result<ExitCode> {
     let rows = runner::run(&config, given, &out).map_err(exit_code)?;
     cli::print(report::text(&rows, config.evaluate.seed).trim_end())?;
     cli::print(format!(
-        "{}: config, data set, models, rows; start with report.html",
+        "{}: all that was made; start with report.html",
         out.display()
     ))?;
     Ok(ExitCode::SUCCESS)
@@ -104,6 +104,10 @@ fn reproduce(file: &Path, out: Option<&Path>, given: &Given) -> Result<ExitCode>
         return Err(BadInput(text).into());
     }
     let expected = rows::read_csv(&recorded).or_bad_input()?;
+    if out.is_some_and(|out| same_folder(out, &results(file, &config))) {
+        let text = "--out is the folder of the rows to compare with; choose another one";
+        return Err(BadInput(text.to_owned()).into());
+    }
     let temporary = tempfile::tempdir()?;
     let found = runner::run(&config, given, out.unwrap_or(temporary.path())).map_err(exit_code)?;
     let lines = runner::differences(&expected, &found);
@@ -116,6 +120,10 @@ fn reproduce(file: &Path, out: Option<&Path>, given: &Given) -> Result<ExitCode>
     }
     cli::print(format!("{} differences from {}", lines.len(), recorded.display()))?;
     Ok(ExitCode::FAILURE)
+}
+
+fn same_folder(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
 fn list(folder: &Path) -> Result<ExitCode> {

@@ -119,19 +119,25 @@ pub enum DatasetError {
 impl Dataset {
     /// Reads one parking type, or all types that the folder holds.
     pub fn read(folder: &Path, kind: Option<ParkingType>) -> Result<Dataset, DatasetError> {
-        let metadata = read_metadata(folder)?;
-        let kinds: Vec<ParkingType> = match kind {
+        let kinds = match kind {
             Some(kind) => vec![kind],
             None => ParkingType::ALL.into_iter().filter(|k| begun(folder, *k)).collect(),
         };
         if kinds.is_empty() {
+            read_metadata(folder)?;
             return Err(DatasetError::Incomplete {
                 path: folder.to_owned(),
                 kind: ParkingType::ALL[0],
             });
         }
+        Self::read_types(folder, &kinds)
+    }
+
+    /// Reads these parking types.
+    pub fn read_types(folder: &Path, kinds: &[ParkingType]) -> Result<Dataset, DatasetError> {
+        let metadata = read_metadata(folder)?;
         let mut samples = Vec::new();
-        for kind in kinds {
+        for &kind in kinds {
             let manifest = read_manifest(folder, &metadata, kind)?;
             let shards = manifest
                 .shards
@@ -230,7 +236,7 @@ pub fn read_metadata(folder: &Path) -> Result<Metadata, DatasetError> {
 }
 
 /// Reads and checks a type's manifest.
-fn read_manifest(
+pub(crate) fn read_manifest(
     folder: &Path,
     metadata: &Metadata,
     kind: ParkingType,

@@ -273,6 +273,12 @@ impl Metadata {
         self.difference(current, |field| !Self::BUILD.contains(&field))
     }
 
+    /// The first setting that differs between the two and decides rows: how they are cut into
+    /// files does not.
+    pub fn content_difference(&self, current: &Metadata) -> Option<Difference> {
+        self.difference(current, |f| f != "cells_per_shard" && !Self::BUILD.contains(&f))
+    }
+
     /// The first field of the build that differs between the two.
     pub fn build_difference(&self, current: &Metadata) -> Option<Difference> {
         self.difference(current, |field| Self::BUILD.contains(&field))

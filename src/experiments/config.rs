@@ -208,9 +208,14 @@ impl ExperimentConfig {
         Ok(())
     }
 
-    /// Whether some method needs a data set and models.
+    /// Whether anything is collected and trained for.
     pub fn learns(&self) -> bool {
-        self.learning_curve.is_some() || self.evaluate.methods.iter().any(|m| m.needs_model())
+        self.learning_curve.is_some() || self.plans_with_models()
+    }
+
+    /// Whether some method of the evaluation needs a model.
+    pub fn plans_with_models(&self) -> bool {
+        self.evaluate.methods.iter().any(|m| m.needs_model())
     }
 
     /// Whether some method needs the networks.

@@ -4,9 +4,11 @@
 //! stage, and compares a rerun with the committed rows.
 
 pub mod config;
+mod given;
 mod learning_curve;
 pub mod runner;
 mod stages;
 
 pub use config::{ConfigError, ExperimentConfig};
-pub use runner::{ExperimentError, Given};
+pub use given::Given;
+pub use runner::ExperimentError;

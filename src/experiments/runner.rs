@@ -7,7 +7,7 @@
 //! | `config.toml`, `run.json` | every setting spelt out; the build; written first |
 //! | `dataset/` | the samples |
 //! | `models/` | `knn.bin`, `mlp-TYPE.safetensors`, their cards and logs |
-//! | `learning-curve/` | points and models of each part of the data, where a curve is asked for |
+//! | `learning-curve.json`, `learning-curve/` | points of the curve, where one is asked for; those and the models of each part |
 //! | `rows.csv`, `rows.parquet`, `report.md`, `report.html` | the evaluation |
 //! | `traces.jsonl` | its paths, for the report |
 //! | `stages/` | which stage was begun or finished, from which settings |
@@ -19,19 +19,18 @@
 use std::path::{Path, PathBuf};
 
 use super::config::ExperimentConfig;
+use super::given::{self, Given};
 use super::learning_curve;
 use super::stages::{Failure, Stages, Todo, settings};
-use crate::dataset::manifest::manifest_path;
-use crate::dataset::read::read_metadata;
 use crate::dataset::schema::GIT_REVISION;
 use crate::dataset::{CollectError, CollectOptions, Dataset, DatasetError, collect};
 use crate::evaluation::report::Provenance;
 use crate::evaluation::rows::{Row, RowsError, read_csv};
 use crate::evaluation::suite;
 use crate::evaluation::{
-    CurvePoint, MethodSettings, Models, ModelsError, OutputError, Outputs, SuiteConfig, SuiteError,
+    Case, CurvePoint, MethodSettings, Models, ModelsError, OutputError, Outputs, SuiteConfig, SuiteError,
 };
-use crate::files::{reason, remove_leftovers, sha256_hex, write_whole};
+use crate::files::{reason, remove_leftovers, write_whole};
 use crate::progress;
 use crate::selectors::artefact::ArtefactError;
 use crate::training::{self, TrainingError};
@@ -87,6 +86,20 @@ pub enum ExperimentError {
         /// Its value in the experiment.
         wanted: String,
     },
+    /// Something was given that the experiment has no use for.
+    #[error("{option}: no method of this experiment plans with a model; leave it out")]
+    Useless {
+        /// The option.
+        option: &'static str,
+    },
+    /// A part of the learning curve cannot be trained from or planned with.
+    #[error("learning_curve.parts[{part}]: {error}")]
+    Part {
+        /// Its index.
+        part: usize,
+        /// Why.
+        error: Box<ExperimentError>,
+    },
     /// The models given cannot be used.
     #[error("--models: {0}")]
     GivenModels(ArtefactError),
@@ -100,7 +113,9 @@ impl ExperimentError {
     pub fn is_bad_input(&self) -> bool {
         match self {
             Self::Io { .. } | Self::Suite(_) => true,
-            Self::GivenData(_) | Self::OtherData { .. } | Self::GivenModels(_) => true,
+            Self::GivenData(_) | Self::OtherData { .. } => true,
+            Self::GivenModels(_) | Self::Models(_) | Self::Useless { .. } => true,
+            Self::Part { error, .. } => error.is_bad_input(),
             Self::Collect(e) => e.is_bad_input(),
             Self::Training(e) => e.is_bad_input(),
             _ => false,
@@ -112,16 +127,6 @@ impl From<Failure> for ExperimentError {
     fn from((path, error): Failure) -> Self {
         Self::Io { path, error }
     }
-}
-
-/// What an experiment takes as it is instead of making it.
-#[derive(Clone, Debug, Default)]
-pub struct Given {
-    /// Folder of the data set, collected with the experiment's settings.
-    pub data: Option<PathBuf>,
-    /// Folder of the models, with the names that [`run`] gives them. Nothing is collected or
-    /// trained, and no learning curve drawn.
-    pub models: Option<PathBuf>,
 }
 
 /// A run of an experiment into a folder.
@@ -139,28 +144,28 @@ pub fn run(
     given: &Given,
     out: &Path,
 ) -> Result<Vec<Row>, ExperimentError> {
+    given.check(config)?;
     let runner = Runner { config, given, out, stages: Stages::new(out) };
-    let mut curve = Vec::new();
-    // What the models come from.
-    let mut trained = String::new();
-    if let Some(folder) = given.models.as_ref().filter(|_| config.learns()) {
-        trained = runner.given_models(folder)?;
-        runner.prepare()?;
-    } else if config.learns() {
-        let given = given.data.as_ref().map(|folder| runner.given_data(folder)).transpose()?;
-        runner.prepare()?;
-        let data = match given {
-            Some(data) => data,
-            None => runner.collect()?,
-        };
-        let mut read = None;
-        runner.train(&data, &mut read)?;
-        curve = runner.learning_curve(&data, &mut read)?;
-        trained = settings((&data, &config.train));
-    } else {
-        runner.prepare()?;
+    if given.models.is_some() {
+        let trained = runner.given_models()?;
+        // All that can be refused is, before anything is written.
+        runner.ready()?;
+        runner.prepare(Some(&trained))?;
+        return runner.evaluate(&settings(("models", trained)), &runner.known_curve());
     }
-    runner.evaluate(&trained, &curve)
+    let data = given.data.as_ref().map(|folder| given::data(config, folder)).transpose()?;
+    runner.prepare(None)?;
+    if !config.learns() {
+        return runner.evaluate("", &[]);
+    }
+    let data = match data {
+        Some(data) => data,
+        None => runner.collect()?,
+    };
+    let mut read = None;
+    runner.train(&data, &mut read)?;
+    let curve = runner.learning_curve(&data, &mut read)?;
+    runner.evaluate(&settings((&data, &config.train)), &curve)
 }
 
 /// The differences between the rows of two runs, times aside; one line each.
@@ -197,9 +202,9 @@ impl Runner<'_> {
         self.model(&format!("mlp-{kind}.safetensors"))
     }
 
-    /// Makes the folders and records what is about to happen.
-    fn prepare(&self) -> Result<(), ExperimentError> {
-        for path in [self.out.to_owned(), self.path("models"), self.path("stages")] {
+    /// Makes the folders and records what is about to happen, with the checksums of models given.
+    fn prepare(&self, models: Option<&[String]>) -> Result<(), ExperimentError> {
+        for path in [self.out.to_owned(), self.path("stages")] {
             std::fs::create_dir_all(&path)
                 .and_then(|()| remove_leftovers(&path))
                 .map_err(|error| ExperimentError::Io { path, error })?;
@@ -210,6 +215,9 @@ impl Runner<'_> {
             "git_revision": GIT_REVISION,
             "seed": self.config.seed,
             "scene_seed": self.config.evaluate.seed,
+            "data": self.given.data,
+            "models": self.given.models,
+            "models_sha256": models,
         });
         self.write("run.json", format!("{run:#}\n"))
     }
@@ -225,48 +233,22 @@ impl Runner<'_> {
         settings(("collect", env!("CARGO_PKG_VERSION"), &c.collect, &c.evaluate.types))
     }
 
-    /// Checks that the data set in `folder` is the experiment's; what identifies it.
-    fn given_data(&self, folder: &Path) -> Result<String, ExperimentError> {
-        let found = read_metadata(folder).map_err(ExperimentError::GivenData)?;
-        let wanted = self.config.collect.metadata();
-        if let Some(d) = found.settings_difference(&wanted) {
-            let (path, field, found, wanted) = (folder.to_owned(), d.field, d.stored, d.current);
-            return Err(ExperimentError::OtherData { path, field, found, wanted });
-        }
-        let mut parts = Vec::new();
-        for &kind in &self.config.evaluate.types {
-            let missing = |_| {
-                let path = folder.to_owned();
-                ExperimentError::GivenData(DatasetError::Incomplete { path, kind })
-            };
-            parts.push(std::fs::read(manifest_path(folder, kind)).map_err(missing)?);
-        }
-        let parts: Vec<&[u8]> = parts.iter().map(Vec::as_slice).collect();
-        Ok(settings(("given", sha256_hex(&parts))))
-    }
-
-    /// Checks that the models in `folder` can be loaded; what identifies them.
-    fn given_models(&self, folder: &Path) -> Result<String, ExperimentError> {
-        let files = self.model_files(folder);
+    /// Checks that the models given can be loaded; their checksums.
+    fn given_models(&self) -> Result<Vec<String>, ExperimentError> {
+        let files = self.model_files();
         Models::load(&files).map_err(|error| match error {
             ModelsError::Load(error) => ExperimentError::GivenModels(error),
             error => error.into(),
         })?;
-        let mut sums = Vec::new();
-        for path in files {
-            let bytes =
-                std::fs::read(&path).map_err(|error| ExperimentError::Io { path, error })?;
-            sums.push(sha256_hex(&[&bytes]));
-        }
-        Ok(settings(("models", sums)))
+        given::checksums(&files)
     }
 
     /// Collects the data set; what identifies it.
     fn collect(&self) -> Result<String, ExperimentError> {
         let settings = self.collect_settings();
         let folder = self.path("dataset");
-        match self.stages.begin("collect", &settings)? {
-            Todo::Nothing if folder.exists() => return Ok(settings),
+        match self.stages.begin("collect", &settings, folder.exists())? {
+            Todo::Nothing => return Ok(settings),
             Todo::GoOn => {}
             _ => remove(&folder)?,
         }
@@ -290,7 +272,7 @@ impl Runner<'_> {
         let kinds = &self.config.evaluate.types;
         let knn = self.model("knn.bin");
         let knn_settings = settings(("knn", data));
-        if self.stages.begin("train-knn", &knn_settings)? != Todo::Nothing || !knn.exists() {
+        if self.stages.begin("train-knn", &knn_settings, knn.exists())? != Todo::Nothing {
             let set = self.dataset(read)?;
             training::knn::train(&set.metadata, &set.samples, kinds, &knn)?;
             self.stages.finish("train-knn", &knn_settings)?;
@@ -302,7 +284,7 @@ impl Runner<'_> {
             let (stage, out) = (format!("train-mlp-{kind}"), self.mlp_model(kind));
             let mlp = &self.config.train.mlp;
             let mlp_settings = settings((&stage, data, mlp));
-            if self.stages.begin(&stage, &mlp_settings)? == Todo::Nothing && out.exists() {
+            if self.stages.begin(&stage, &mlp_settings, out.exists())? == Todo::Nothing {
                 continue;
             }
             let set = self.dataset(read)?;
@@ -334,41 +316,51 @@ impl Runner<'_> {
             let scenes = (&curve.methods, curve.count, curve.seed, &c.vehicle);
             let planning = (&e.types, &e.levels, e.max_expansions, &e.planner, &e.n3p);
             let settings = settings((&stage, data, part, scenes, planning, &c.train));
-            let done = self.stages.begin(&stage, &settings)? == Todo::Nothing;
-            let known = std::fs::read(&file).ok().filter(|_| done);
-            let known = known.and_then(|j| serde_json::from_slice::<Vec<CurvePoint>>(&j).ok());
-            if let Some(known) = known {
+            let known = read_points(&file);
+            let todo = self.stages.begin(&stage, &settings, known.is_some())?;
+            if let (Todo::Nothing, Some(known)) = (todo, known) {
                 points.extend(known);
                 continue;
             }
             tracing::info!("{stage}: part {} of {}", i + 1, curve.parts.len());
             std::fs::create_dir_all(&folder)
                 .map_err(|error| ExperimentError::Io { path: folder.clone(), error })?;
-            let new = learning_curve::points(c, curve, self.dataset(read)?, part, &folder)?;
-            let json = serde_json::to_string_pretty(&new).expect("plain data") + "\n";
-            write_whole(&file, json.as_bytes())
-                .map_err(|error| ExperimentError::Io { path: file, error })?;
+            let new = learning_curve::points(c, curve, self.dataset(read)?, part, &folder)
+                .map_err(|error| ExperimentError::Part { part: i, error: Box::new(error) })?;
+            self.write(&format!("learning-curve/{i}/points.json"), to_json(&new))?;
             self.stages.finish(&stage, &settings)?;
             points.extend(new);
         }
+        self.write(CURVE, to_json(&points))?;
         Ok(points)
+    }
+
+    /// The learning curve that an earlier run left, where the experiment has one.
+    fn known_curve(&self) -> Vec<CurvePoint> {
+        let wanted = self.config.learning_curve.is_some();
+        wanted.then(|| read_points(&self.path(CURVE))).flatten().unwrap_or_default()
     }
 
     /// The data set, read at most once.
     fn dataset<'d>(&self, read: &'d mut Option<Dataset>) -> Result<&'d Dataset, ExperimentError> {
         if read.is_none() {
+            let kinds = &self.config.evaluate.types;
             *read = Some(match &self.given.data {
-                Some(folder) => Dataset::read(folder, None).map_err(ExperimentError::GivenData)?,
-                None => Dataset::read(&self.path("dataset"), None)?,
+                Some(folder) => {
+                    Dataset::read_types(folder, kinds).map_err(ExperimentError::GivenData)?
+                }
+                None => Dataset::read_types(&self.path("dataset"), kinds)?,
             });
         }
         Ok(read.as_ref().expect("just read"))
     }
 
-    /// The files of the models that the evaluation needs, in `folder`.
-    fn model_files(&self, folder: &Path) -> Vec<PathBuf> {
+    /// The files of the models that the evaluation needs.
+    fn model_files(&self) -> Vec<PathBuf> {
+        let made = self.path("models");
+        let folder = self.given.models.as_ref().unwrap_or(&made);
         let mut files = Vec::new();
-        if self.config.learns() {
+        if self.config.plans_with_models() {
             files.push(folder.join("knn.bin"));
         }
         if self.config.needs_mlp() {
@@ -378,23 +370,10 @@ impl Runner<'_> {
         files
     }
 
-    fn models(&self) -> Result<Models, ExperimentError> {
-        let made = self.path("models");
-        let folder = self.given.models.as_ref().unwrap_or(&made);
-        Ok(Models::load(&self.model_files(folder))?)
-    }
-
-    /// Runs the methods with the models that `trained` identifies.
-    fn evaluate(&self, trained: &str, curve: &[CurvePoint]) -> Result<Vec<Row>, ExperimentError> {
+    /// Models, scenes and settings of the evaluation, checked.
+    fn ready(&self) -> Result<(Models, Vec<Case>, SuiteConfig), ExperimentError> {
         let e = &self.config.evaluate;
-        let settings = settings(("evaluate", trained, &self.config.vehicle, e));
-        let rows_csv = self.path("rows.csv");
-        match self.stages.begin("evaluate", &settings)? {
-            Todo::Nothing if rows_csv.exists() => return Ok(read_csv(&rows_csv)?),
-            Todo::GoOn => {}
-            _ => remove(&rows_csv)?,
-        }
-        let models = self.models()?;
+        let models = Models::load(&self.model_files())?;
         let suite_config = SuiteConfig {
             methods: e.methods.clone(),
             settings: MethodSettings { planner: e.planner, n3p: e.n3p },
@@ -404,6 +383,21 @@ impl Runner<'_> {
         let vehicle = &self.config.vehicle;
         let cases = suite::generated(vehicle, &e.types, &e.levels, e.count, e.seed)?;
         suite::check(&cases, &models, &suite_config)?;
+        Ok((models, cases, suite_config))
+    }
+
+    /// Runs the methods with the models that `trained` identifies.
+    fn evaluate(&self, trained: &str, curve: &[CurvePoint]) -> Result<Vec<Row>, ExperimentError> {
+        let (e, name) = (&self.config.evaluate, &self.config.name);
+        // The report shows the curve, too.
+        let settings = settings(("evaluate", trained, &self.config.vehicle, e, name, curve));
+        let (models, cases, suite_config) = self.ready()?;
+        let rows_csv = self.path("rows.csv");
+        match self.stages.begin("evaluate", &settings, rows_csv.exists())? {
+            Todo::Nothing => return Ok(read_csv(&rows_csv)?),
+            Todo::GoOn => {}
+            Todo::BeginAnew => remove(&rows_csv)?,
+        }
         let (mut outputs, mut rows) = Outputs::resume(self.out)?;
         let bar = progress::bar((cases.len() * e.methods.len()) as u64, "evaluate");
         bar.set_position(rows.len() as u64);
@@ -414,11 +408,17 @@ impl Runner<'_> {
         bar.finish_and_clear();
         rows.extend(new);
         let scenes = format!(
-            "{} generated, {} of each type and level, seed {}; data set and training seed {}",
+            "{} generated, {} of each type and level, seed {}; {}",
             cases.len(),
             e.count,
             e.seed,
-            self.config.seed
+            match (&self.given.models, &self.given.data) {
+                (Some(models), _) => format!("models from {}", models.display()),
+                (None, Some(data)) => {
+                    format!("data set from {}, training seed {}", data.display(), self.config.seed)
+                }
+                (None, None) => format!("data set and training seed {}", self.config.seed),
+            }
         );
         let provenance = Provenance::here(scenes, e.seed, e.max_expansions, 1);
         let title = format!("Experiment {}", self.config.name);
@@ -426,6 +426,19 @@ impl Runner<'_> {
         self.stages.finish("evaluate", &settings)?;
         Ok(rows)
     }
+}
+
+/// The points of the learning curve, all parts together: what reports show, and what is worth
+/// keeping.
+const CURVE: &str = "learning-curve.json";
+
+/// The points in a file; `None` where it is missing or damaged.
+fn read_points(path: &Path) -> Option<Vec<CurvePoint>> {
+    serde_json::from_slice(&std::fs::read(path).ok()?).ok()
+}
+
+fn to_json(points: &[CurvePoint]) -> String {
+    serde_json::to_string_pretty(points).expect("plain data") + "\n"
 }
 
 fn remove(path: &Path) -> Result<(), ExperimentError> {

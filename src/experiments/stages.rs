@@ -41,15 +41,16 @@ impl Stages {
         Self { folder: out.join("stages") }
     }
 
-    /// Compares a stage's record with `settings`, and records that it begins.
-    pub fn begin(&self, stage: &str, settings: &str) -> Result<Todo, Failure> {
+    /// Compares a stage's record with `settings`, and records that it begins. A finished stage
+    /// whose output is not `present` begins anew.
+    pub fn begin(&self, stage: &str, settings: &str, present: bool) -> Result<Todo, Failure> {
         let record = std::fs::read(self.path(stage))
             .ok()
             .and_then(|bytes| serde_json::from_slice::<Stage>(&bytes).ok())
             .filter(|s| s.settings_sha256 == settings);
         let todo = match record {
-            Some(s) if s.finished => Todo::Nothing,
-            Some(s) if s.git_revision == GIT_REVISION => Todo::GoOn,
+            Some(s) if s.finished && present => Todo::Nothing,
+            Some(s) if !s.finished && s.git_revision == GIT_REVISION => Todo::GoOn,
             _ => Todo::BeginAnew,
         };
         match todo {
@@ -93,12 +94,14 @@ mod tests {
         std::fs::create_dir(dir.path().join("stages")).unwrap();
         let stages = Stages::new(dir.path());
         let (a, b) = (settings(("train", 1)), settings(("train", 2)));
-        assert_eq!(stages.begin("train", &a).unwrap(), Todo::BeginAnew);
-        assert_eq!(stages.begin("train", &a).unwrap(), Todo::GoOn);
+        assert_eq!(stages.begin("train", &a, true).unwrap(), Todo::BeginAnew);
+        assert_eq!(stages.begin("train", &a, true).unwrap(), Todo::GoOn);
         stages.finish("train", &a).unwrap();
-        assert_eq!(stages.begin("train", &a).unwrap(), Todo::Nothing);
-        assert_eq!(stages.begin("train", &b).unwrap(), Todo::BeginAnew, "other settings");
+        assert_eq!(stages.begin("train", &a, true).unwrap(), Todo::Nothing);
+        assert_eq!(stages.begin("train", &a, false).unwrap(), Todo::BeginAnew, "output is gone");
+        assert_eq!(stages.begin("train", &a, true).unwrap(), Todo::GoOn, "and being redone");
+        assert_eq!(stages.begin("train", &b, true).unwrap(), Todo::BeginAnew, "other settings");
         std::fs::write(dir.path().join("stages/train.json"), "{").unwrap();
-        assert_eq!(stages.begin("train", &a).unwrap(), Todo::BeginAnew, "a damaged record");
+        assert_eq!(stages.begin("train", &a, true).unwrap(), Todo::BeginAnew, "a damaged record");
     }
 }
