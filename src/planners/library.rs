@@ -15,7 +15,7 @@ use std::collections::BinaryHeap;
 use crate::curves::{Path, Segment};
 use crate::geometry::{Aabb, Pose};
 use crate::vehicle::Vehicle;
-use crate::world::collision::{BodyFrame, Sweep};
+use crate::world::collision::{BodyFrame, Contact, Sweep};
 
 use super::Problem;
 use super::analytic::{AnalyticExpansion, Entry};
@@ -35,7 +35,9 @@ pub struct Library {
 struct Manoeuvre {
     /// Where it begins, and the motions from there.
     entry: Entry,
-    /// What it sweeps when driven back from the goal, nearest the goal first.
+    /// What its motions sweep when driven back from the goal, the longest first: it touches
+    /// something most often. A verdict presumes that the motion begins free of contact; where it
+    /// does not, that of another motion is the right one.
     motions: Vec<(BodyFrame, Sweep)>,
 }
 
@@ -63,6 +65,8 @@ impl Library {
             motions.push((BodyFrame::new(pose), Sweep::new(&self.footprint, back)));
             pose = back.end(pose);
         }
+        let length = |(_, sweep): &(BodyFrame, Sweep)| sweep.segment().length.abs();
+        motions.sort_by(|a, b| length(b).total_cmp(&length(a)));
         let entry = Entry::new(pose, segments, true, &self.vehicle, model);
         self.manoeuvres.push(Manoeuvre { entry, motions });
     }
@@ -80,7 +84,8 @@ impl Library {
     /// The manoeuvres that are free in `problem`, whatever its start.
     pub fn free_in(&self, problem: &Problem) -> Vec<usize> {
         let base = BodyFrame::new(problem.goal);
-        let free = |i: &usize| self.manoeuvres[*i].is_free(&base, problem);
+        let mut suspect = None;
+        let free = |i: &usize| self.manoeuvres[*i].is_free(&base, problem, &mut suspect);
         (0..self.len()).filter(free).collect()
     }
 
@@ -91,10 +96,13 @@ impl Library {
 }
 
 impl Manoeuvre {
-    /// Whether driving it to the goal, which `base` is at, touches nothing.
-    fn is_free(&self, base: &BodyFrame, problem: &Problem) -> bool {
+    /// Whether driving it to the goal, which `base` is at, touches nothing; `suspect` is what the
+    /// last one touched.
+    fn is_free(&self, base: &BodyFrame, problem: &Problem, suspect: &mut Option<Contact>) -> bool {
         let world = &problem.collision;
-        self.motions.iter().all(|(at, sweep)| world.sweep_is_free(&base.compose(at), sweep))
+        self.motions
+            .iter()
+            .all(|(at, sweep)| world.sweep_is_free_of(suspect, &base.compose(at), sweep))
     }
 }
 
@@ -170,7 +178,8 @@ impl LibrarySearch {
         debug_assert!(library.fits(problem));
         self.rank(library, 0..library.len(), problem, model, bound);
         let base = BodyFrame::new(problem.goal);
-        let is_free = |i: usize| library.manoeuvres[i].is_free(&base, problem);
+        let mut suspect = None;
+        let is_free = |i: usize| library.manoeuvres[i].is_free(&base, problem, &mut suspect);
         self.first(library, is_free, problem, model, bound)
     }
 
@@ -192,7 +201,7 @@ impl LibrarySearch {
     fn first(
         &mut self,
         library: &Library,
-        is_free: impl Fn(usize) -> bool,
+        mut is_free: impl FnMut(usize) -> bool,
         problem: &Problem,
         model: &CostModel,
         bound: f64,
@@ -302,6 +311,24 @@ mod tests {
             .collect();
         assert!(manoeuvres.len() > 10, "{}", manoeuvres.len());
         Library::new(&manoeuvres, &Vehicle::default(), footprint, &config.cost)
+    }
+
+    #[test]
+    fn no_verdict_depends_on_what_was_touched_before() {
+        for kind in ParkingType::ALL {
+            for problem in problems(kind, Level::Extreme, 3) {
+                let library = library(kind, *problem.collision.footprint());
+                let base = BodyFrame::new(problem.goal);
+                let alone = |i: &usize| {
+                    let is_free = |(at, sweep): &(BodyFrame, Sweep)| {
+                        problem.collision.sweep_is_free(&base.compose(at), sweep)
+                    };
+                    library.manoeuvres[*i].motions.iter().all(is_free)
+                };
+                let expected: Vec<usize> = (0..library.len()).filter(alone).collect();
+                assert_eq!(library.free_in(&problem), expected);
+            }
+        }
     }
 
     #[test]
