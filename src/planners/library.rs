@@ -9,7 +9,7 @@
 //!
 //! Where the manoeuvres come from: [`crate::training::library`].
 
-use std::cmp::Ordering;
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use crate::curves::{Path, Segment};
@@ -19,8 +19,8 @@ use crate::world::collision::{BodyFrame, Contact, Sweep};
 
 use super::Problem;
 use super::analytic::{AnalyticExpansion, Entry};
+use super::approach::{Approaches, Poses};
 use super::cost::CostModel;
-use super::nonholonomic::NonHolonomic;
 
 /// Manoeuvres prepared for one footprint and one cost model.
 #[derive(Clone, Debug)]
@@ -28,6 +28,8 @@ pub struct Library {
     vehicle: Vehicle,
     footprint: Aabb,
     manoeuvres: Vec<Manoeuvre>,
+    /// Where they begin, seen from the goal, and their costs: all that ranking looks at.
+    begins: Poses,
 }
 
 /// A known way to the goal; poses are seen from the goal.
@@ -50,7 +52,8 @@ impl Library {
         footprint: Aabb,
         model: &CostModel,
     ) -> Self {
-        let mut library = Self { vehicle: *vehicle, footprint, manoeuvres: Vec::new() };
+        let (all, begins) = Default::default();
+        let mut library = Self { vehicle: *vehicle, footprint, manoeuvres: all, begins };
         for segments in manoeuvres {
             library.add(segments.clone(), model);
         }
@@ -68,6 +71,7 @@ impl Library {
         let length = |(_, sweep): &(BodyFrame, Sweep)| sweep.segment().length.abs();
         motions.sort_by(|a, b| length(b).total_cmp(&length(a)));
         let entry = Entry::new(pose, segments, true, &self.vehicle, model);
+        self.begins.push(entry.pose, entry.cost());
         self.manoeuvres.push(Manoeuvre { entry, motions });
     }
 
@@ -120,48 +124,37 @@ pub struct LibraryPlan {
 }
 
 /// Looks plans up; buffers and the table of estimates are reused.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct LibrarySearch {
-    queue: BinaryHeap<Candidate>,
+    queue: BinaryHeap<Reverse<Candidate>>,
     /// The candidates that are free, in the order they were checked.
     free: Vec<Candidate>,
-    estimate: NonHolonomic,
+    approaches: Approaches,
     analytic: AnalyticExpansion,
 }
 
-impl Default for LibrarySearch {
-    fn default() -> Self {
-        let (queue, free, analytic) = Default::default();
-        Self { queue, free, estimate: NonHolonomic::coarse(), analytic }
-    }
-}
-
-/// Ordered so that the heap pops the least estimate, then the first added.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Candidate {
-    estimate: f32,
-    index: u32,
-}
+/// A manoeuvre and its estimated cost, ordered by cost, then by index: the bits of the cost above
+/// those of the index. Floats that are not negative are ordered like their bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Candidate(u64);
 
 impl Candidate {
+    fn new(estimate: f32, index: usize) -> Self {
+        Self(u64::from(estimate.to_bits()) << 32 | index as u64)
+    }
+
+    fn index(self) -> usize {
+        (self.0 & u64::from(u32::MAX)) as usize
+    }
+
+    fn estimate(self) -> f64 {
+        f64::from(f32::from_bits((self.0 >> 32) as u32))
+    }
+
     /// The cost up to which a plan by this candidate is preferred to the next one's: one more
     /// change of gear and some steering than estimated.
     fn window(self) -> f64 {
-        f64::from(self.estimate) + 4.0
-    }
-}
-
-impl Eq for Candidate {}
-
-impl Ord for Candidate {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.estimate.total_cmp(&self.estimate).then(other.index.cmp(&self.index))
-    }
-}
-
-impl PartialOrd for Candidate {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
+        self.estimate() + 4.0
     }
 }
 
@@ -209,11 +202,11 @@ impl LibrarySearch {
         let mut free = std::mem::take(&mut self.free);
         free.clear();
         let mut plan = None;
-        while let Some(candidate) = self.queue.pop() {
-            if is_free(candidate.index as usize) {
+        while let Some(Reverse(candidate)) = self.queue.pop() {
+            if is_free(candidate.index()) {
                 free.push(candidate);
                 let bound = bound.min(candidate.window());
-                plan = self.join(library, candidate.index as usize, problem, model, bound);
+                plan = self.join(library, candidate.index(), problem, model, bound);
                 if plan.is_some() {
                     break;
                 }
@@ -223,7 +216,7 @@ impl LibrarySearch {
         let again = || {
             free.iter()
                 .filter(|c| c.window() < bound)
-                .find_map(|c| self.join(library, c.index as usize, problem, model, bound))
+                .find_map(|c| self.join(library, c.index(), problem, model, bound))
         };
         plan = plan.or_else(again);
         self.free = free;
@@ -232,7 +225,7 @@ impl LibrarySearch {
 
     /// The manoeuvres found free in the last call, in the order they were tried.
     pub fn tried(&self) -> impl Iterator<Item = usize> + '_ {
-        self.free.iter().map(|c| c.index as usize)
+        self.free.iter().map(|c| c.index())
     }
 
     /// Fills the queue with those of `manoeuvres` that may cost less than `bound`.
@@ -244,20 +237,14 @@ impl LibrarySearch {
         model: &CostModel,
         bound: f64,
     ) {
-        self.estimate.reset(&problem.vehicle, model);
+        let goal = problem.start.relative(problem.goal);
+        let mut begins = self.approaches.view(&library.begins, goal, &problem.vehicle, model);
         let mut queue = std::mem::take(&mut self.queue).into_vec();
         queue.clear();
-        let goal = problem.start.relative(problem.goal);
-        let seen_from_start = BodyFrame::new(goal);
         for index in manoeuvres {
-            let m = &library.manoeuvres[index];
-            let begin = m.entry.pose;
-            let position = seen_from_start.parent(begin.position());
-            let pose = Pose::new(position.x, position.y, goal.heading + begin.heading);
-            let approach = self.estimate.cost(pose, &problem.vehicle, model);
-            let estimate = m.entry.cost() + approach;
-            if estimate < bound {
-                queue.push(Candidate { estimate: estimate as f32, index: index as u32 });
+            let estimate = begins.cost(index);
+            if f64::from(estimate) < bound {
+                queue.push(Reverse(Candidate::new(estimate, index)));
             }
         }
         self.queue = BinaryHeap::from(queue);
