@@ -30,9 +30,12 @@ impl Aabb {
 
     /// The smallest box that also contains `p`.
     pub fn include(self, p: Vec2) -> Self {
+        // `f64::min` takes care of NaN, which takes longer than the rest.
+        let least = |a: f64, b: f64| if b < a { b } else { a };
+        let most = |a: f64, b: f64| if b > a { b } else { a };
         Self {
-            min: Vec2::new(self.min.x.min(p.x), self.min.y.min(p.y)),
-            max: Vec2::new(self.max.x.max(p.x), self.max.y.max(p.y)),
+            min: Vec2::new(least(self.min.x, p.x), least(self.min.y, p.y)),
+            max: Vec2::new(most(self.max.x, p.x), most(self.max.y, p.y)),
         }
     }
 

@@ -11,6 +11,7 @@ mod segment;
 
 pub use aabb::Aabb;
 pub use frame::Frame;
+pub(crate) use polygon::is_within;
 pub use polygon::{Polygon, PolygonError};
 pub use pose::{Pose, signed_angle, wrap_angle};
 pub use segment::{distance_to_segment, segment_in_box};

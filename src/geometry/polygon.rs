@@ -43,19 +43,13 @@ impl Polygon {
 
     /// The edges in order, the closing edge last.
     pub fn edges(&self) -> impl Iterator<Item = (Vec2, Vec2)> + '_ {
-        let n = self.vertices.len();
-        (0..n).map(move |i| (self.vertices[i], self.vertices[(i + 1) % n]))
+        let (first, others) = self.vertices.split_at(1);
+        self.vertices.iter().copied().zip(others.iter().chain(first).copied())
     }
 
     /// Whether `p` lies inside (even-odd rule; points on the border may go either way).
     pub fn contains(&self, p: Vec2) -> bool {
-        let mut inside = false;
-        for (a, b) in self.edges() {
-            if (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x) {
-                inside = !inside;
-            }
-        }
-        inside
+        is_within(p, self.edges())
     }
 
     /// The polygon with every vertex mapped by `f`.
@@ -67,6 +61,17 @@ impl Polygon {
     pub fn aabb(&self) -> Aabb {
         Aabb::around(self.vertices.iter().copied())
     }
+}
+
+/// [`Polygon::contains`] for the polygon of these `edges`.
+pub(crate) fn is_within(p: Vec2, edges: impl Iterator<Item = (Vec2, Vec2)>) -> bool {
+    let mut inside = false;
+    for (a, b) in edges {
+        if (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x) {
+            inside = !inside;
+        }
+    }
+    inside
 }
 
 #[cfg(test)]

@@ -9,18 +9,18 @@
 //!
 //! Where the manoeuvres come from: [`crate::training::library`].
 
-use std::cmp::Ordering;
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use crate::curves::{Path, Segment};
 use crate::geometry::{Aabb, Pose};
 use crate::vehicle::Vehicle;
-use crate::world::collision::{BodyFrame, Sweep};
+use crate::world::collision::{BodyFrame, Contact, Sweep};
 
 use super::Problem;
 use super::analytic::{AnalyticExpansion, Entry};
+use super::approach::{Approaches, Poses};
 use super::cost::CostModel;
-use super::nonholonomic::NonHolonomic;
 
 /// Manoeuvres prepared for one footprint and one cost model.
 #[derive(Clone, Debug)]
@@ -28,6 +28,8 @@ pub struct Library {
     vehicle: Vehicle,
     footprint: Aabb,
     manoeuvres: Vec<Manoeuvre>,
+    /// Where they begin, seen from the goal, and their costs: all that ranking looks at.
+    begins: Poses,
 }
 
 /// A known way to the goal; poses are seen from the goal.
@@ -35,7 +37,9 @@ pub struct Library {
 struct Manoeuvre {
     /// Where it begins, and the motions from there.
     entry: Entry,
-    /// What it sweeps when driven back from the goal, nearest the goal first.
+    /// What its motions sweep when driven back from the goal, the longest first: it touches
+    /// something most often. A verdict presumes that the motion begins free of contact; where it
+    /// does not, that of another motion is the right one.
     motions: Vec<(BodyFrame, Sweep)>,
 }
 
@@ -48,7 +52,8 @@ impl Library {
         footprint: Aabb,
         model: &CostModel,
     ) -> Self {
-        let mut library = Self { vehicle: *vehicle, footprint, manoeuvres: Vec::new() };
+        let (all, begins) = Default::default();
+        let mut library = Self { vehicle: *vehicle, footprint, manoeuvres: all, begins };
         for segments in manoeuvres {
             library.add(segments.clone(), model);
         }
@@ -63,7 +68,10 @@ impl Library {
             motions.push((BodyFrame::new(pose), Sweep::new(&self.footprint, back)));
             pose = back.end(pose);
         }
+        let length = |(_, sweep): &(BodyFrame, Sweep)| sweep.segment().length.abs();
+        motions.sort_by(|a, b| length(b).total_cmp(&length(a)));
         let entry = Entry::new(pose, segments, true, &self.vehicle, model);
+        self.begins.push(entry.pose, entry.cost());
         self.manoeuvres.push(Manoeuvre { entry, motions });
     }
 
@@ -80,7 +88,8 @@ impl Library {
     /// The manoeuvres that are free in `problem`, whatever its start.
     pub fn free_in(&self, problem: &Problem) -> Vec<usize> {
         let base = BodyFrame::new(problem.goal);
-        let free = |i: &usize| self.manoeuvres[*i].is_free(&base, problem);
+        let mut suspect = None;
+        let free = |i: &usize| self.manoeuvres[*i].is_free(&base, problem, &mut suspect);
         (0..self.len()).filter(free).collect()
     }
 
@@ -91,10 +100,13 @@ impl Library {
 }
 
 impl Manoeuvre {
-    /// Whether driving it to the goal, which `base` is at, touches nothing.
-    fn is_free(&self, base: &BodyFrame, problem: &Problem) -> bool {
+    /// Whether driving it to the goal, which `base` is at, touches nothing; `suspect` is what the
+    /// last one touched.
+    fn is_free(&self, base: &BodyFrame, problem: &Problem, suspect: &mut Option<Contact>) -> bool {
         let world = &problem.collision;
-        self.motions.iter().all(|(at, sweep)| world.sweep_is_free(&base.compose(at), sweep))
+        self.motions
+            .iter()
+            .all(|(at, sweep)| world.sweep_is_free_of(suspect, &base.compose(at), sweep))
     }
 }
 
@@ -112,48 +124,37 @@ pub struct LibraryPlan {
 }
 
 /// Looks plans up; buffers and the table of estimates are reused.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct LibrarySearch {
-    queue: BinaryHeap<Candidate>,
+    queue: BinaryHeap<Reverse<Candidate>>,
     /// The candidates that are free, in the order they were checked.
     free: Vec<Candidate>,
-    estimate: NonHolonomic,
+    approaches: Approaches,
     analytic: AnalyticExpansion,
 }
 
-impl Default for LibrarySearch {
-    fn default() -> Self {
-        let (queue, free, analytic) = Default::default();
-        Self { queue, free, estimate: NonHolonomic::coarse(), analytic }
-    }
-}
-
-/// Ordered so that the heap pops the least estimate, then the first added.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Candidate {
-    estimate: f32,
-    index: u32,
-}
+/// A manoeuvre and its estimated cost, ordered by cost, then by index: the bits of the cost above
+/// those of the index. Floats that are not negative are ordered like their bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Candidate(u64);
 
 impl Candidate {
+    fn new(estimate: f32, index: usize) -> Self {
+        Self(u64::from(estimate.to_bits()) << 32 | index as u64)
+    }
+
+    fn index(self) -> usize {
+        (self.0 & u64::from(u32::MAX)) as usize
+    }
+
+    fn estimate(self) -> f64 {
+        f64::from(f32::from_bits((self.0 >> 32) as u32))
+    }
+
     /// The cost up to which a plan by this candidate is preferred to the next one's: one more
     /// change of gear and some steering than estimated.
     fn window(self) -> f64 {
-        f64::from(self.estimate) + 4.0
-    }
-}
-
-impl Eq for Candidate {}
-
-impl Ord for Candidate {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.estimate.total_cmp(&self.estimate).then(other.index.cmp(&self.index))
-    }
-}
-
-impl PartialOrd for Candidate {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
+        self.estimate() + 4.0
     }
 }
 
@@ -170,7 +171,8 @@ impl LibrarySearch {
         debug_assert!(library.fits(problem));
         self.rank(library, 0..library.len(), problem, model, bound);
         let base = BodyFrame::new(problem.goal);
-        let is_free = |i: usize| library.manoeuvres[i].is_free(&base, problem);
+        let mut suspect = None;
+        let is_free = |i: usize| library.manoeuvres[i].is_free(&base, problem, &mut suspect);
         self.first(library, is_free, problem, model, bound)
     }
 
@@ -192,7 +194,7 @@ impl LibrarySearch {
     fn first(
         &mut self,
         library: &Library,
-        is_free: impl Fn(usize) -> bool,
+        mut is_free: impl FnMut(usize) -> bool,
         problem: &Problem,
         model: &CostModel,
         bound: f64,
@@ -200,11 +202,11 @@ impl LibrarySearch {
         let mut free = std::mem::take(&mut self.free);
         free.clear();
         let mut plan = None;
-        while let Some(candidate) = self.queue.pop() {
-            if is_free(candidate.index as usize) {
+        while let Some(Reverse(candidate)) = self.queue.pop() {
+            if is_free(candidate.index()) {
                 free.push(candidate);
                 let bound = bound.min(candidate.window());
-                plan = self.join(library, candidate.index as usize, problem, model, bound);
+                plan = self.join(library, candidate.index(), problem, model, bound);
                 if plan.is_some() {
                     break;
                 }
@@ -214,7 +216,7 @@ impl LibrarySearch {
         let again = || {
             free.iter()
                 .filter(|c| c.window() < bound)
-                .find_map(|c| self.join(library, c.index as usize, problem, model, bound))
+                .find_map(|c| self.join(library, c.index(), problem, model, bound))
         };
         plan = plan.or_else(again);
         self.free = free;
@@ -223,7 +225,7 @@ impl LibrarySearch {
 
     /// The manoeuvres found free in the last call, in the order they were tried.
     pub fn tried(&self) -> impl Iterator<Item = usize> + '_ {
-        self.free.iter().map(|c| c.index as usize)
+        self.free.iter().map(|c| c.index())
     }
 
     /// Fills the queue with those of `manoeuvres` that may cost less than `bound`.
@@ -235,20 +237,14 @@ impl LibrarySearch {
         model: &CostModel,
         bound: f64,
     ) {
-        self.estimate.reset(&problem.vehicle, model);
+        let goal = problem.start.relative(problem.goal);
+        let mut begins = self.approaches.view(&library.begins, goal, &problem.vehicle, model);
         let mut queue = std::mem::take(&mut self.queue).into_vec();
         queue.clear();
-        let goal = problem.start.relative(problem.goal);
-        let seen_from_start = BodyFrame::new(goal);
         for index in manoeuvres {
-            let m = &library.manoeuvres[index];
-            let begin = m.entry.pose;
-            let position = seen_from_start.parent(begin.position());
-            let pose = Pose::new(position.x, position.y, goal.heading + begin.heading);
-            let approach = self.estimate.cost(pose, &problem.vehicle, model);
-            let estimate = m.entry.cost() + approach;
-            if estimate < bound {
-                queue.push(Candidate { estimate: estimate as f32, index: index as u32 });
+            let estimate = begins.cost(index);
+            if f64::from(estimate) < bound {
+                queue.push(Reverse(Candidate::new(estimate, index)));
             }
         }
         self.queue = BinaryHeap::from(queue);
@@ -302,6 +298,24 @@ mod tests {
             .collect();
         assert!(manoeuvres.len() > 10, "{}", manoeuvres.len());
         Library::new(&manoeuvres, &Vehicle::default(), footprint, &config.cost)
+    }
+
+    #[test]
+    fn no_verdict_depends_on_what_was_touched_before() {
+        for kind in ParkingType::ALL {
+            for problem in problems(kind, Level::Extreme, 3) {
+                let library = library(kind, *problem.collision.footprint());
+                let base = BodyFrame::new(problem.goal);
+                let alone = |i: &usize| {
+                    let is_free = |(at, sweep): &(BodyFrame, Sweep)| {
+                        problem.collision.sweep_is_free(&base.compose(at), sweep)
+                    };
+                    library.manoeuvres[*i].motions.iter().all(is_free)
+                };
+                let expected: Vec<usize> = (0..library.len()).filter(alone).collect();
+                assert_eq!(library.free_in(&problem), expected);
+            }
+        }
     }
 
     #[test]

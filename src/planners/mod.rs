@@ -5,9 +5,11 @@
 //! `open` (queues), `lattice` (visited states), `cost_to_go` and `nonholonomic` (the two
 //! heuristics), [`analytic`] (Reeds-Shepp expansion) and [`cost`]. Its variants are
 //! [`PlainHybridAStar`] (no curves), [`MultiHeuristicHybridAStar`] and
-//! [`ScenarioHybridAStar`] (parallel spots). [`library`] does without any search.
+//! [`ScenarioHybridAStar`] (parallel spots). [`library`] does without any search; `approach`
+//! estimates the ways to its manoeuvres.
 
 pub mod analytic;
+mod approach;
 mod config;
 pub mod cost;
 mod cost_to_go;

@@ -47,7 +47,7 @@ impl Problem {
     /// The problem of a validated scene.
     pub fn new(scene: &Scene) -> Result<Problem, ProblemError> {
         let SpotGuess { frame, kind } = spot::guess(scene);
-        let obstacles = scene.geometry().seen_from(&frame);
+        let obstacles = scene.geometry_seen_from(&frame);
         let bounds = scene.bounds.map(|b| spot::bounds_in_frame(b, &frame));
         let start = frame.local_from_world(scene.start);
         let goal = frame.local_from_world(scene.goal);

@@ -81,9 +81,10 @@ fn at_shift(
         if x_max <= -grid.back + TOUCH {
             continue;
         }
+        let lowest = a.y.min(b.y) - boundary;
         for (i, width) in widths.iter_mut().enumerate() {
             let dead_end = axis.value(i);
-            if x_min >= dead_end - TOUCH {
+            if x_min >= dead_end - TOUCH || lowest >= *width {
                 continue;
             }
             if let Some((a, b)) = clip(a, b, 0, -grid.back + TOUCH, dead_end - TOUCH) {

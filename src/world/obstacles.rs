@@ -1,6 +1,6 @@
 //! Obstacle geometry without an index.
 
-use crate::geometry::{Aabb, Frame, Polygon, Vec2};
+use crate::geometry::{Aabb, Polygon, Vec2};
 
 /// Solid polygons and single points, all in one frame.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -15,18 +15,6 @@ impl Obstacles {
     /// Whether there is nothing.
     pub fn is_empty(&self) -> bool {
         self.polygons.is_empty() && self.points.is_empty()
-    }
-
-    /// The same obstacles, seen from `frame`.
-    pub fn seen_from(&self, frame: &Frame) -> Obstacles {
-        Obstacles {
-            polygons: self
-                .polygons
-                .iter()
-                .map(|p| p.map(|v| frame.local_from_world_point(v)))
-                .collect(),
-            points: self.points.iter().map(|&p| frame.local_from_world_point(p)).collect(),
-        }
     }
 
     /// Every polygon edge, and every point as an edge of length zero.

@@ -4,7 +4,9 @@
 //! neighbouring points), each with a box. A query tests the boxes one after the other:
 //! for the tens to hundreds of clusters of a parking scene this beats a tree.
 
-use crate::geometry::{Aabb, Vec2};
+use std::ops::Range;
+
+use crate::geometry::{Aabb, Vec2, is_within};
 use crate::world::Obstacles;
 
 /// Edges per cluster.
@@ -12,20 +14,26 @@ const CLUSTER: usize = 8;
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct EdgeIndex {
-    boxes: Vec<Aabb>,
-    /// `starts[i]..starts[i + 1]` are the edges of cluster `i`.
-    starts: Vec<u32>,
+    clusters: Vec<Cluster>,
+    /// All edges of each polygon.
+    polygons: Vec<Cluster>,
     edges: Vec<(Vec2, Vec2)>,
+}
+
+/// Edges that lie together.
+#[derive(Clone, Debug)]
+struct Cluster {
+    aabb: Aabb,
+    /// Which edges of the index.
+    edges: Range<usize>,
 }
 
 impl EdgeIndex {
     pub fn new(obstacles: &Obstacles) -> Self {
-        let mut index = Self { starts: vec![0], ..Self::default() };
-        let mut edges = Vec::new();
+        let mut index = Self::default();
         for polygon in &obstacles.polygons {
-            edges.clear();
-            edges.extend(polygon.edges());
-            index.add(&edges);
+            let edges = index.add(polygon.edges());
+            index.polygons.push(Cluster { aabb: polygon.aabb(), edges });
         }
         // Points in stripes of two metres, so that a cluster's points lie together.
         let mut points = obstacles.points.clone();
@@ -33,31 +41,50 @@ impl EdgeIndex {
             let stripe = |p: &Vec2| (p.x / 2.0).floor();
             stripe(a).total_cmp(&stripe(b)).then(a.y.total_cmp(&b.y)).then(a.x.total_cmp(&b.x))
         });
-        edges.clear();
-        edges.extend(points.iter().map(|&p| (p, p)));
-        index.add(&edges);
+        index.add(points.iter().map(|&p| (p, p)));
         index
     }
 
-    fn add(&mut self, edges: &[(Vec2, Vec2)]) {
-        for cluster in edges.chunks(CLUSTER) {
-            self.boxes.push(Aabb::around(cluster.iter().flat_map(|&(a, b)| [a, b])));
-            self.edges.extend_from_slice(cluster);
-            self.starts.push(self.edges.len() as u32);
+    /// Adds `edges` in clusters; returns their numbers.
+    fn add(&mut self, edges: impl Iterator<Item = (Vec2, Vec2)>) -> Range<usize> {
+        let all = self.edges.len();
+        self.edges.extend(edges);
+        let all = all..self.edges.len();
+        for first in all.clone().step_by(CLUSTER) {
+            let edges = first..all.end.min(first + CLUSTER);
+            let ends = self.edges[edges.clone()].iter().flat_map(|&(a, b)| [a, b]);
+            self.clusters.push(Cluster { aabb: Aabb::around(ends), edges });
         }
+        all
     }
 
-    /// Whether `hit` holds for some edge of a cluster that touches `near`.
+    /// Whether `p` lies inside a polygon.
+    pub fn is_in_polygon(&self, p: Vec2) -> bool {
+        self.polygons.iter().any(|Cluster { aabb, edges }| {
+            aabb.contains(p) && is_within(p, self.edges[edges.clone()].iter().copied())
+        })
+    }
+
+    /// The first edge for which `hit` holds, of the clusters that touch `near`.
     #[inline]
-    pub fn any_near(&self, near: &Aabb, mut hit: impl FnMut(Vec2, Vec2) -> bool) -> bool {
-        for (i, b) in self.boxes.iter().enumerate() {
-            if b.intersects(near) {
-                let range = self.starts[i] as usize..self.starts[i + 1] as usize;
-                if self.edges[range].iter().any(|&(a, b)| hit(a, b)) {
-                    return true;
+    pub fn first_near(
+        &self,
+        near: &Aabb,
+        mut hit: impl FnMut(Vec2, Vec2) -> bool,
+    ) -> Option<usize> {
+        for Cluster { aabb, edges } in &self.clusters {
+            if aabb.intersects(near) {
+                let hit = self.edges[edges.clone()].iter().position(|&(a, b)| hit(a, b));
+                if let Some(i) = hit {
+                    return Some(edges.start + i);
                 }
             }
         }
-        false
+        None
+    }
+
+    /// The edge of a number given by [`EdgeIndex::first_near`].
+    pub fn edge(&self, number: usize) -> (Vec2, Vec2) {
+        self.edges[number]
     }
 }

@@ -10,7 +10,7 @@ mod index;
 mod sweep;
 
 use crate::curves::{Path, Segment};
-use crate::geometry::{Aabb, Polygon, Pose, Vec2, segment_in_box};
+use crate::geometry::{Aabb, Pose, Vec2, segment_in_box};
 use crate::vehicle::Vehicle;
 
 use super::Obstacles;
@@ -18,11 +18,14 @@ use bounds::ConvexBounds;
 use index::EdgeIndex;
 pub use sweep::Sweep;
 
+/// An obstacle edge of one world that a motion touches, by its number.
+#[derive(Clone, Copy, Debug)]
+pub struct Contact(usize);
+
 /// Obstacles indexed for swept checks of one footprint.
 #[derive(Clone, Debug)]
 pub struct CollisionWorld {
     index: EdgeIndex,
-    polygons: Vec<(Aabb, Polygon)>,
     bounds: Option<ConvexBounds>,
     footprint: Aabb,
 }
@@ -40,7 +43,6 @@ impl CollisionWorld {
     ) -> Self {
         Self {
             index: EdgeIndex::new(obstacles),
-            polygons: obstacles.polygons.iter().map(|p| (p.aabb(), p.clone())).collect(),
             bounds: bounds.map(ConvexBounds::new),
             footprint: vehicle.footprint(margin),
         }
@@ -68,14 +70,11 @@ impl CollisionWorld {
         }
         let body = BodyFrame::new(pose);
         let near = body.aabb_of(&self.footprint);
-        let touches = self
-            .index
-            .any_near(&near, |a, b| segment_in_box(body.local(a), body.local(b), &self.footprint));
+        let touches = self.index.first_near(&near, |a, b| {
+            segment_in_box(body.local(a), body.local(b), &self.footprint)
+        });
         // No edge touches the footprint, so it lies wholly inside or outside each polygon.
-        let inside = |(aabb, p): &(Aabb, Polygon)| {
-            aabb.contains(pose.position()) && p.contains(pose.position())
-        };
-        !touches && !self.polygons.iter().any(inside)
+        touches.is_none() && !self.index.is_in_polygon(pose.position())
     }
 
     /// Whether driving `segment` from the free pose `start` touches nothing.
@@ -89,11 +88,38 @@ impl CollisionWorld {
     /// [`CollisionWorld::segment_is_free`] with the sweep of this world's footprint
     /// prepared beforehand, as the search does for its motion primitives.
     pub fn sweep_is_free(&self, start: &BodyFrame, sweep: &Sweep) -> bool {
-        if self.bounds.as_ref().is_some_and(|b| !b.contains_motion(start.pose, sweep.segment())) {
+        self.stays_in_bounds(start, sweep) && self.contact(start, sweep).is_none()
+    }
+
+    fn stays_in_bounds(&self, start: &BodyFrame, sweep: &Sweep) -> bool {
+        self.bounds.as_ref().is_none_or(|b| b.contains_motion(start.pose, sweep.segment()))
+    }
+
+    /// Some contact of the motion with an obstacle; the bounds are not looked at.
+    fn contact(&self, start: &BodyFrame, sweep: &Sweep) -> Option<Contact> {
+        let near = start.aabb_of(sweep.aabb());
+        let hit = |a, b| sweep.hits(start.local(a), start.local(b));
+        self.index.first_near(&near, hit).map(Contact)
+    }
+
+    /// [`CollisionWorld::sweep_is_free`] for many motions in turn, most of them not free: what the
+    /// last of them touched is looked at first, and is kept in `suspect`.
+    pub fn sweep_is_free_of(
+        &self,
+        suspect: &mut Option<Contact>,
+        start: &BodyFrame,
+        sweep: &Sweep,
+    ) -> bool {
+        let again = |&Contact(edge): &Contact| {
+            let (a, b) = self.index.edge(edge);
+            sweep.hits(start.local(a), start.local(b))
+        };
+        if suspect.as_ref().is_some_and(again) {
             return false;
         }
-        let near = start.aabb_of(sweep.aabb());
-        !self.index.any_near(&near, |a, b| sweep.hits(start.local(a), start.local(b)))
+        let contact = self.contact(start, sweep);
+        *suspect = contact.or(*suspect);
+        contact.is_none() && self.stays_in_bounds(start, sweep)
     }
 
     /// Whether driving all `segments` from the free pose `start` touches nothing.

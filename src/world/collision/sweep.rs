@@ -114,10 +114,11 @@ impl Sweep {
     /// Of the two ends only `a` is tested as a corner of its own: in a polygon's boundary
     /// every vertex is the `a` of one edge.
     pub fn hits(&self, a: Vec2, b: Vec2) -> bool {
-        if a.x.max(b.x) < self.aabb.min.x
-            || a.x.min(b.x) > self.aabb.max.x
-            || a.y.max(b.y) < self.aabb.min.y
-            || a.y.min(b.y) > self.aabb.max.y
+        let Aabb { min, max } = &self.aabb;
+        if (a.x < min.x && b.x < min.x)
+            || (a.x > max.x && b.x > max.x)
+            || (a.y < min.y && b.y < min.y)
+            || (a.y > max.y && b.y > max.y)
         {
             return false;
         }
