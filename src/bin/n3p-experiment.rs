@@ -85,10 +85,7 @@ fn run(file: &Path, out: Option<&Path>, given: &Given) -> Result<ExitCode> {
     let out = out.map_or_else(|| results(file, &config), Path::to_owned);
     let rows = runner::run(&config, given, &out).map_err(exit_code)?;
     cli::print(report::text(&rows, config.evaluate.seed).trim_end())?;
-    cli::print(format!(
-        "{}: all that was made; start with report.html",
-        out.display()
-    ))?;
+    cli::print(format!("{}: all that was made; start with report.html", out.display()))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -41,8 +41,7 @@ pub(super) fn data(config: &ExperimentConfig, folder: &Path) -> Result<String, E
     }
     let mut sums = Vec::new();
     for &kind in &config.evaluate.types {
-        let manifest =
-            read_manifest(folder, &found, kind).map_err(ExperimentError::GivenData)?;
+        let manifest = read_manifest(folder, &found, kind).map_err(ExperimentError::GivenData)?;
         sums.extend(manifest.shards.into_iter().map(|shard| shard.sha256));
     }
     Ok(settings(("given", sums)))

@@ -28,7 +28,8 @@ use crate::evaluation::report::Provenance;
 use crate::evaluation::rows::{Row, RowsError, read_csv};
 use crate::evaluation::suite;
 use crate::evaluation::{
-    Case, CurvePoint, MethodSettings, Models, ModelsError, OutputError, Outputs, SuiteConfig, SuiteError,
+    Case, CurvePoint, MethodSettings, Models, ModelsError, OutputError, Outputs, SuiteConfig,
+    SuiteError,
 };
 use crate::files::{reason, remove_leftovers, write_whole};
 use crate::progress;

@@ -45,9 +45,10 @@ const STARTS: [usize; 2] = [4, 24];
 const LEVER: f64 = 2.0;
 /// Price per square metre of mean distance to the neighbouring cells' poses.
 const APART: f64 = 10.0;
-/// Price of an expanded node; the other prices are those of [`crate::planners::cost`]. Small: a
-/// cell leaves less room than its scenes do, so that a search there overstates what they take.
-const NODE: f64 = 0.01;
+/// Price of an expanded node; the other prices are those of [`crate::planners::cost`].
+const NODE: f64 = 0.1;
+/// Price of having to search at all: what a search prepares takes as long as some nodes.
+const SEARCH: f64 = 3.0;
 /// Expansions after which the search for an approach is given up.
 const MOST_NODES: usize = 800;
 /// Of the starts without a direct approach, so many are searched for one; the others are
@@ -249,7 +250,7 @@ impl Judge<'_> {
             let mut left = MOST_NODES;
             let leg = planner.search(world.around(*start), *start, goal, None, &mut left);
             let approach =
-                leg.map_or(LOST, |leg| leg.cost + NODE * (MOST_NODES - left) as f64);
+                leg.map_or(LOST, |leg| leg.cost + SEARCH + NODE * (MOST_NODES - left) as f64);
             price += approach * missed.len() as f64 / searched as f64;
         }
         price / n
