@@ -4,9 +4,10 @@ use n3p::curves::Segment;
 use n3p::curves::reeds_shepp::{Word, words};
 use n3p::evaluation::{Method, MethodSettings, Models, PathFile, oracle, suite};
 use n3p::geometry::Pose;
-use n3p::planners::{Budget, Problem};
+use n3p::planners::{Budget, Problem, Route};
 use n3p::selectors::Features;
 use n3p::selectors::artefact::Model;
+use n3p::selectors::guided::RankedConfig;
 use n3p::vehicle::{Gear, Vehicle};
 use n3p::world::abstraction::abstractions;
 use n3p::world::cell::{Cell, Grid};
@@ -100,4 +101,36 @@ fn no_method_fails_on_900_scenes() {
             }
         }
     }
+}
+
+/// Each setting of `n3p` takes something away that spares searches.
+#[test]
+fn settings_decide_what_is_tried_before_a_search() {
+    let models = Models::load(&["models/knn.bin"]).unwrap();
+    let vehicle = models.vehicle().unwrap();
+    let kind = [ParkingType::Parallel];
+    let scenes = suite::generated(&vehicle, &kind, &[Level::Extreme], 40, 4242).unwrap();
+    let plans = |n3p: RankedConfig| {
+        let settings = MethodSettings { n3p, ..MethodSettings::default() };
+        let mut planner = Method::N3p.build(&models, &settings).unwrap();
+        let (mut library, mut nodes) = (0, 0);
+        for case in &scenes {
+            let problem = Problem::new(&case.scene).unwrap();
+            let result = planner.plan(&problem, Budget { max_expansions: 200_000 });
+            assert!(result.outcome.is_ok(), "{}", case.scene.name);
+            library += usize::from(result.guidance.unwrap().route == Route::Library);
+            nodes += result.expansions;
+        }
+        (library, nodes)
+    };
+    let all = RankedConfig::default();
+    let without = RankedConfig { library: false, ..all };
+    let one = RankedConfig { library: false, candidates: 1, abstractions: 1 };
+    assert_eq!(plans(all), (scenes.len(), 0));
+    let (some, one) = (plans(without), plans(one));
+    assert_eq!((some.0, one.0), (0, 0), "nothing is looked up");
+    assert!(0 < some.1 && some.1 < one.1, "{} and {} nodes", some.1, one.1);
+    assert!(
+        RankedConfig { candidates: 0, ..all }.validate().unwrap_err().contains("candidates is 0")
+    );
 }

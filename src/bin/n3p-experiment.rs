@@ -107,6 +107,10 @@ fn reproduce(file: &Path, out: Option<&Path>, given: &Given) -> Result<ExitCode>
     }
     let temporary = tempfile::tempdir()?;
     let found = runner::run(&config, given, out.unwrap_or(temporary.path())).map_err(exit_code)?;
+    cli::print(report::text(&found, config.evaluate.seed).trim_end())?;
+    if let Some(out) = out {
+        cli::print(format!("{}: start with report.html", out.display()))?;
+    }
     let lines = runner::differences(&expected, &found);
     if lines.is_empty() {
         cli::print(format!("{} rows agree with {}", found.len(), recorded.display()))?;

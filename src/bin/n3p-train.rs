@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Instant;
 
 use clap::{Args, Parser, Subcommand};
 use n3p::cli::{self, BadInput, OrBadInput};
@@ -37,7 +38,7 @@ struct Common {
     #[arg(long = "type", value_name = "TYPE")]
     kind: Option<ParkingType>,
     /// Folder of the data set
-    #[arg(long, value_name = "DIR", default_value = "datasets/small")]
+    #[arg(long, value_name = "DIR", default_value = "datasets/paper")]
     data: PathBuf,
 }
 
@@ -119,6 +120,7 @@ fn mlp(args: &MlpArgs) -> anyhow::Result<ExitCode> {
 fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
     artefact::check_writable(&args.out).or_bad_input()?;
     let (data, kinds) = read(&args.common)?;
+    let begin = Instant::now();
     let log = training::knn::train(&data.metadata, &data.samples, &kinds, &args.out)
         .map_err(|e| exit_code(e, &args.common.data))?;
     for training::knn::KnnKindLog { kind, samples, occupied_cells, manoeuvres, .. } in &log.kinds {
@@ -126,8 +128,8 @@ fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
             "{kind}: {samples} samples in {occupied_cells} cells, {manoeuvres} manoeuvres"
         ))?;
     }
-    let size = log.bytes as f64 / f64::from(1 << 20);
-    cli::print(format!("{}: {size:.2} MiB", args.out.display()))?;
+    let (size, seconds) = (log.bytes as f64 / f64::from(1 << 20), begin.elapsed().as_secs_f64());
+    cli::print(format!("{}: {size:.2} MiB, built in {seconds:.2} s", args.out.display()))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -47,7 +47,8 @@ impl Subset {
         Ok(())
     }
 
-    /// The rows of `data` that lie in it, as if collected on the coarser grid. Where a coarser
+    /// The rows of `data` that lie in it, in cells of the coarser grid; starts are those of the
+    /// whole. Where a coarser
     /// axis misses the largest value, the cells above its last one belong to that.
     pub fn of(&self, data: &Dataset) -> Dataset {
         let old = data.metadata.grid;

@@ -127,7 +127,7 @@ pub fn markdown(
 
 /// How to read the learning curve.
 pub(super) const CURVE_NOTE: &str = "\
-Each line: models from a part of the data set, planning in generated scenes of all levels that \
+Each line: models from a part of the data set, planning in generated scenes that \
 are neither trained on nor reported above. “Per cell” counts samples collected in each cell of \
 the grid, “samples” those solved.\n";
 

@@ -85,14 +85,6 @@ impl Library {
         self.manoeuvres.len()
     }
 
-    /// The manoeuvres that are free in `problem`, whatever its start.
-    pub fn free_in(&self, problem: &Problem) -> Vec<usize> {
-        let base = BodyFrame::new(problem.goal);
-        let mut suspect = None;
-        let free = |i: &usize| self.manoeuvres[*i].is_free(&base, problem, &mut suspect);
-        (0..self.len()).filter(free).collect()
-    }
-
     /// Whether it knows nothing.
     pub fn is_empty(&self) -> bool {
         self.manoeuvres.is_empty()
@@ -107,6 +99,25 @@ impl Manoeuvre {
         self.motions
             .iter()
             .all(|(at, sweep)| world.sweep_is_free_of(suspect, &base.compose(at), sweep))
+    }
+}
+
+/// Which manoeuvres of a library are free in one environment, as far as it was asked: the same for
+/// every start there.
+#[derive(Clone, Debug, Default)]
+pub struct Verdicts {
+    free: Vec<Option<bool>>,
+    suspect: Option<Contact>,
+}
+
+impl Verdicts {
+    fn is_free(&mut self, library: &Library, index: usize, problem: &Problem) -> bool {
+        // The library may have grown.
+        self.free.resize(library.len(), None);
+        *self.free[index].get_or_insert_with(|| {
+            let base = BodyFrame::new(problem.goal);
+            library.manoeuvres[index].is_free(&base, problem, &mut self.suspect)
+        })
     }
 }
 
@@ -169,25 +180,25 @@ impl LibrarySearch {
         bound: f64,
     ) -> Option<LibraryPlan> {
         debug_assert!(library.fits(problem));
-        self.rank(library, 0..library.len(), problem, model, bound);
+        self.rank(library, problem, model, bound);
         let base = BodyFrame::new(problem.goal);
         let mut suspect = None;
         let is_free = |i: usize| library.manoeuvres[i].is_free(&base, problem, &mut suspect);
         self.first(library, is_free, problem, model, bound)
     }
 
-    /// The same where it is known which manoeuvres are `free`, as for many starts in one
-    /// environment ([`Library::free_in`]).
-    pub fn plan_among(
+    /// The same for one of many starts in one environment, whose `verdicts` are kept.
+    pub fn plan_again(
         &mut self,
         library: &Library,
-        free: &[usize],
+        verdicts: &mut Verdicts,
         problem: &Problem,
         model: &CostModel,
         bound: f64,
     ) -> Option<LibraryPlan> {
-        self.rank(library, free.iter().copied(), problem, model, bound);
-        self.first(library, |_| true, problem, model, bound)
+        debug_assert!(library.fits(problem));
+        self.rank(library, problem, model, bound);
+        self.first(library, |i| verdicts.is_free(library, i, problem), problem, model, bound)
     }
 
     /// The first plan of the queue.
@@ -228,20 +239,13 @@ impl LibrarySearch {
         self.free.iter().map(|c| c.index())
     }
 
-    /// Fills the queue with those of `manoeuvres` that may cost less than `bound`.
-    fn rank(
-        &mut self,
-        library: &Library,
-        manoeuvres: impl Iterator<Item = usize>,
-        problem: &Problem,
-        model: &CostModel,
-        bound: f64,
-    ) {
+    /// Fills the queue with all manoeuvres that may cost less than `bound`.
+    fn rank(&mut self, library: &Library, problem: &Problem, model: &CostModel, bound: f64) {
         let goal = problem.start.relative(problem.goal);
         let mut begins = self.approaches.view(&library.begins, goal, &problem.vehicle, model);
         let mut queue = std::mem::take(&mut self.queue).into_vec();
         queue.clear();
-        for index in manoeuvres {
+        for index in 0..library.len() {
             let estimate = begins.cost(index);
             if f64::from(estimate) < bound {
                 queue.push(Reverse(Candidate::new(estimate, index)));
@@ -313,7 +317,10 @@ mod tests {
                     library.manoeuvres[*i].motions.iter().all(is_free)
                 };
                 let expected: Vec<usize> = (0..library.len()).filter(alone).collect();
-                assert_eq!(library.free_in(&problem), expected);
+                let mut verdicts = Verdicts::default();
+                let free = |i: &usize| verdicts.is_free(&library, *i, &problem);
+                let found: Vec<usize> = (0..library.len()).filter(free).collect();
+                assert_eq!(found, expected);
             }
         }
     }
@@ -334,6 +341,12 @@ mod tests {
                 let less = plan.cost - 1.0;
                 assert!(within(less).is_none_or(|p| p.cost < less));
                 assert_eq!(within(f64::INFINITY).as_ref(), Some(&plan));
+                let mut verdicts = Verdicts::default();
+                for bound in [less, f64::INFINITY, f64::INFINITY] {
+                    let again =
+                        search.plan_again(&library, &mut verdicts, &problem, &config.cost, bound);
+                    assert_eq!(again, search.plan(&library, &problem, &config.cost, bound));
+                }
                 let near = |s: &crate::curves::Sample| s.pose.distance(plan.preparatory) < 0.03;
                 assert!(plan.path.sample(0.05).iter().any(near));
                 assert!(PlanResult::certified(&problem, plan.path, 0).outcome.is_ok());

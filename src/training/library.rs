@@ -10,7 +10,7 @@ use crate::curves::{Path, Segment, reeds_shepp};
 use crate::dataset::{Metadata, Sample};
 use crate::geometry::{Aabb, Pose};
 use crate::planners::hybrid_astar::GoalSet;
-use crate::planners::library::{Library, LibrarySearch};
+use crate::planners::library::{Library, LibrarySearch, Verdicts};
 use crate::planners::{HybridAStar, Problem};
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
@@ -39,27 +39,31 @@ pub(super) fn condense(
     let mut library = Library::new(&[], vehicle, vehicle.footprint(Problem::MARGIN), &planner.cost);
     let mut manoeuvres = Vec::new();
     let taken = spread(solved, metadata.manoeuvres_per_cell);
+    let mut cells = Vec::new();
     for_each_cell(metadata, kind, &taken, |problem, samples| {
-        let mut free = library.free_in(problem);
+        let mut verdicts = Verdicts::default();
         for sample in samples {
             problem.start = sample.start;
             let Some((manoeuvre, cost)) = ending(&mut hars, metadata, sample, problem) else {
                 continue;
             };
             let bound = cost + TOLERANCE;
-            if search.plan_among(&library, &free, problem, &planner.cost, bound).is_none() {
-                free.push(library.len());
+            let known = search.plan_again(&library, &mut verdicts, problem, &planner.cost, bound);
+            if known.is_none() {
                 library.add(manoeuvre.clone(), &planner.cost);
                 manoeuvres.push(manoeuvre);
             }
         }
+        cells.push(verdicts);
     });
+    let mut cells = cells.into_iter();
     let mut records = vec![Record::default(); manoeuvres.len()];
     for_each_cell(metadata, kind, &taken, |problem, samples| {
-        let free = library.free_in(problem);
+        let mut verdicts = cells.next().expect("the same cells");
         for sample in samples {
             problem.start = sample.start;
-            let plan = search.plan_among(&library, &free, problem, &planner.cost, f64::INFINITY);
+            let any = f64::INFINITY;
+            let plan = search.plan_again(&library, &mut verdicts, problem, &planner.cost, any);
             if let Some(plan) = plan {
                 records[plan.manoeuvre].uses += 1;
                 search.tried().for_each(|i| records[i].tries += 1);

@@ -84,14 +84,14 @@ pub struct MlpConfig {
 impl Default for MlpConfig {
     fn default() -> Self {
         Self {
-            epochs: 60,
+            epochs: 30,
             batch: 256,
             learning_rate: 1e-3,
             weight_decay: 1e-4,
             schedule: Schedule::Cosine,
             loss: Loss::Huber,
             huber_delta: 0.1,
-            patience: 20,
+            patience: 30,
             targets: Targets::PerCell,
             behind: 8.0,
             validation: Validation::Starts,

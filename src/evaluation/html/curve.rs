@@ -119,7 +119,7 @@ fn draw(kind: &str, points: &[&CurvePoint]) -> String {
                 "<circle class=\"mean\" cx=\"{x}\" cy=\"{y}\" r=\"4\"><title>{title}</title></circle>"
             );
         }
-        for p in others {
+        for p in &others {
             let (x, y) = at(p);
             let (d, title) = (format!("M{} {}", num(x), num(y - 5.0)), escape(&describe(p)));
             let _ = write!(
@@ -127,7 +127,7 @@ fn draw(kind: &str, points: &[&CurvePoint]) -> String {
                 "<path class=\"mean ref\" d=\"{d}l5 5l-5 5l-5-5z\"><title>{title}</title></path>"
             );
         }
-        if let Some((x, y)) = line.last().map(|p| at(p)) {
+        if let Some((x, y)) = line.last().or(others.last()).map(|p| at(p)) {
             let (x, y, name) = (num(x + 9.0), num(y + 4.0), escape(method));
             let _ = write!(svg, "<text class=\"label\" x=\"{x}\" y=\"{y}\">{name}</text>");
         }

@@ -58,7 +58,7 @@ precision. Inputs and outputs are normalised; the file holds the scaling.
 ## Limits
 
 - **No guarantee.** Nothing ensures that a curve leads from the proposed pose into the spot, or that the
-  pose is free. Of the rows kept apart, {to_goal} had such a curve.
+  pose is free. Of the rows kept apart that were judged, {to_goal} had such a curve.
 - **One vehicle**: {vehicle}. For any other the model is refused.
 - **{Spots} only**, in cells of the grid below. Smaller spots, lanes and dead ends have
   no cell, hence no answer.
@@ -129,7 +129,7 @@ Every setting, as a file for `n3p-train mlp --type {kind} --config FILE`:
 ```toml
 {settings}```
 
-Mean loss per output, in standard deviations of the outputs ([all epochs](<{curve}>)):
+Mean loss per output, outputs in units of their standard deviation ([all epochs](<{curve}>)):
 
 | epoch | rows learnt | rows kept apart |
 |--:|--:|--:|
