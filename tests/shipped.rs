@@ -4,7 +4,7 @@ use std::path::Path;
 
 use n3p::dataset::{CollectConfig, Dataset};
 use n3p::experiments::ExperimentConfig;
-use n3p::selectors::KnnSelector;
+use n3p::selectors::knn::KnnSelector;
 use n3p::selectors::mlp::MlpSelector;
 use n3p::training::MlpConfig;
 use n3p::world::ParkingType;

@@ -189,7 +189,7 @@ mod tests {
         let loss = |i: usize| EpochLoss { train: 1.0 / i as f32, validation: 2.0 / i as f32 };
         TrainingLog {
             kind: KIND,
-            config: MlpConfig { seed: 4321, behind: 6.5, ..MlpConfig::default() },
+            config: MlpConfig { seed: 4321, behind: 6.5, epochs: 60, ..MlpConfig::default() },
             data_sha256: "abc123".to_owned(),
             train_rows: 370,
             validation_rows: 41,
@@ -239,7 +239,7 @@ mod tests {
                 "| Seed | 77 |",
                 "| Seed | 4321 (",
                 "| reverse | 567 | 500 | 411 (82.2 %) |",
-                "Of the rows kept apart, 91.2 % had",
+                "Of the rows kept apart that were judged, 91.2 % had",
                 "| Epochs | 40 of at most 60; stored is the network of epoch 39 |",
                 "| 39 (best) | 0.02564 | 0.05128 |",
                 "](<net.training.svg>)",
