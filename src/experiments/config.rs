@@ -91,8 +91,8 @@ impl LearningCurveConfig {
         if self.parts.is_empty() {
             return Err("parts is empty; expected at least one".to_owned());
         }
-        let parts = self.parts.iter().enumerate();
-        parts.map(|(i, p)| p.validate().map_err(|e| format!("parts[{i}].{e}"))).collect()
+        let mut parts = self.parts.iter().enumerate();
+        parts.try_for_each(|(i, p)| p.validate().map_err(|e| format!("parts[{i}].{e}")))
     }
 }
 
