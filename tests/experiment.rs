@@ -4,6 +4,7 @@ use std::path::Path;
 
 use assert_cmd::Command;
 use n3p::evaluation::rows::{Row, read_csv};
+use predicates::prelude::*;
 use predicates::str::contains;
 
 const TINY: &str = r#"
@@ -119,6 +120,24 @@ fn runs_goes_on_and_reproduces() {
         experiment(dir.path(), &arguments).code(2).stderr(contains(told));
         assert!(!dir.path().join("refused").exists(), "nothing is written");
     }
+    // What is refused leaves the results alone, and they are not compared with themselves.
+    let before = std::fs::read(&rows_csv).unwrap();
+    experiment(dir.path(), &["run", "tiny.toml", "--models", "nowhere"]).code(2);
+    experiment(dir.path(), &["reproduce", "tiny.toml", "--out", "results/tiny"]).code(2);
+    assert_eq!(std::fs::read(&rows_csv).unwrap(), before);
+
+    // Another curve is another report; what is gone is made again.
+    std::fs::remove_file(results.join("models/knn.bin")).unwrap();
+    let changed = TINY.replace("{ samples_per_cell = 5 }", "{ samples_per_cell = 7 }");
+    std::fs::write(dir.path().join("tiny.toml"), changed).unwrap();
+    experiment(dir.path(), &["run", "tiny.toml"])
+        .success()
+        .stderr(contains("train-mlp-reverse: finished before"))
+        .stderr(contains("train-knn: finished before").not());
+    let report = std::fs::read_to_string(results.join("report.md")).unwrap();
+    assert!(report.contains(&curve(1, 7)) && !report.contains(&curve(1, 5)), "{report}");
+    assert_eq!(untimed(&rows_csv), rows);
+
     let other =
         std::fs::read_to_string(&rows_csv).unwrap().replacen("ha-rs,true", "ha-rs,false", 1);
     std::fs::write(&rows_csv, other).unwrap();
