@@ -264,7 +264,7 @@ impl Metadata {
     pub(super) fn settings(&self) -> Value {
         let mut value = serde_json::to_value(self).expect("metadata is plain data");
         let fields = value.as_object_mut().expect("a struct is a JSON object");
-        fields.retain(|f, _| f != "cells_per_shard" && !Self::BUILD.contains(&f.as_str()));
+        fields.retain(|field, _| Self::decides_rows(field));
         value
     }
 
@@ -276,7 +276,11 @@ impl Metadata {
     /// The first setting that differs between the two and decides rows: how they are cut into
     /// files does not.
     pub fn content_difference(&self, current: &Metadata) -> Option<Difference> {
-        self.difference(current, |f| f != "cells_per_shard" && !Self::BUILD.contains(&f))
+        self.difference(current, Self::decides_rows)
+    }
+
+    fn decides_rows(field: &str) -> bool {
+        field != "cells_per_shard" && !Self::BUILD.contains(&field)
     }
 
     /// The first field of the build that differs between the two.

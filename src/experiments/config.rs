@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::dataset::{CollectConfig, Subset};
-use crate::evaluation::Method;
 use crate::evaluation::suite::MAX_COUNT;
+use crate::evaluation::{Method, MethodSettings, SuiteConfig};
 use crate::files::{TomlError, read_toml};
 use crate::planners::HybridAStarConfig;
 use crate::selectors::guided::RankedConfig;
@@ -121,6 +121,18 @@ pub struct EvaluateConfig {
     /// Settings of the method `n3p`.
     #[serde(default)]
     pub n3p: RankedConfig,
+}
+
+impl EvaluateConfig {
+    /// These settings for `methods`, one thread.
+    pub(super) fn suite(&self, methods: &[Method]) -> SuiteConfig {
+        SuiteConfig {
+            methods: methods.to_vec(),
+            settings: MethodSettings { planner: self.planner, n3p: self.n3p },
+            max_expansions: self.max_expansions,
+            threads: 1,
+        }
+    }
 }
 
 fn all_types() -> Vec<ParkingType> {

@@ -7,7 +7,7 @@ use super::runner::ExperimentError;
 use crate::dataset::{Dataset, Subset};
 use crate::evaluation::learning_curve::Part;
 use crate::evaluation::suite;
-use crate::evaluation::{CurvePoint, MethodSettings, Models, Row, SuiteConfig};
+use crate::evaluation::{CurvePoint, Models, Row};
 use crate::progress;
 use crate::training;
 
@@ -34,12 +34,7 @@ pub(super) fn points(
     }
     let models = Models::load(&files)?;
     let e = &config.evaluate;
-    let suite_config = SuiteConfig {
-        methods: curve.methods.clone(),
-        settings: MethodSettings { planner: e.planner, n3p: e.n3p },
-        max_expansions: e.max_expansions,
-        threads: 1,
-    };
+    let suite_config = e.suite(&curve.methods);
     let cases = suite::generated(&config.vehicle, kinds, &e.levels, curve.count, curve.seed)?;
     let bar = progress::bar((cases.len() * curve.methods.len()) as u64, "learning curve");
     let rows = suite::run(&cases, &models, &suite_config, 0, |_, _| {

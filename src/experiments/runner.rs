@@ -28,8 +28,7 @@ use crate::evaluation::report::Provenance;
 use crate::evaluation::rows::{Row, RowsError, read_csv};
 use crate::evaluation::suite;
 use crate::evaluation::{
-    Case, CurvePoint, MethodSettings, Models, ModelsError, OutputError, Outputs, SuiteConfig,
-    SuiteError,
+    Case, CurvePoint, Models, ModelsError, OutputError, Outputs, SuiteConfig, SuiteError,
 };
 use crate::files::{reason, remove_leftovers, write_whole};
 use crate::progress;
@@ -138,6 +137,9 @@ struct Runner<'a> {
     stages: Stages,
 }
 
+/// What an evaluation needs, checked: models, scenes and settings.
+type Ready = (Models, Vec<Case>, SuiteConfig);
+
 /// Runs `config` into the folder `out`, going on with what an earlier run left there.
 /// Returns the rows. Progress and what is skipped go to stderr.
 pub fn run(
@@ -148,16 +150,16 @@ pub fn run(
     given.check(config)?;
     let runner = Runner { config, given, out, stages: Stages::new(out) };
     if given.models.is_some() {
-        let trained = runner.given_models()?;
         // All that can be refused is, before anything is written.
-        runner.ready()?;
+        let ready = runner.ready()?;
+        let trained = given::checksums(&runner.model_files())?;
         runner.prepare(Some(&trained))?;
-        return runner.evaluate(&settings(("models", trained)), &runner.known_curve());
+        return runner.evaluate(ready, &settings(("models", trained)), &runner.known_curve());
     }
     let data = given.data.as_ref().map(|folder| given::data(config, folder)).transpose()?;
     runner.prepare(None)?;
     if !config.learns() {
-        return runner.evaluate("", &[]);
+        return runner.evaluate(runner.ready()?, "", &[]);
     }
     let data = match data {
         Some(data) => data,
@@ -166,7 +168,7 @@ pub fn run(
     let mut read = None;
     runner.train(&data, &mut read)?;
     let curve = runner.learning_curve(&data, &mut read)?;
-    runner.evaluate(&settings((&data, &config.train)), &curve)
+    runner.evaluate(runner.ready()?, &settings((&data, &config.train)), &curve)
 }
 
 /// The differences between the rows of two runs, times aside; one line each.
@@ -205,11 +207,8 @@ impl Runner<'_> {
 
     /// Makes the folders and records what is about to happen, with the checksums of models given.
     fn prepare(&self, models: Option<&[String]>) -> Result<(), ExperimentError> {
-        for path in [self.out.to_owned(), self.path("stages")] {
-            std::fs::create_dir_all(&path)
-                .and_then(|()| remove_leftovers(&path))
-                .map_err(|error| ExperimentError::Io { path, error })?;
-        }
+        self.make_folder(self.out.to_owned())?;
+        self.make_folder(self.path("stages"))?;
         self.write("config.toml", self.config.to_toml())?;
         let run = serde_json::json!({
             "crate_version": env!("CARGO_PKG_VERSION"),
@@ -223,6 +222,13 @@ impl Runner<'_> {
         self.write("run.json", format!("{run:#}\n"))
     }
 
+    /// Makes a folder, and removes what killed runs left in it.
+    fn make_folder(&self, path: PathBuf) -> Result<(), ExperimentError> {
+        std::fs::create_dir_all(&path)
+            .and_then(|()| remove_leftovers(&path))
+            .map_err(|error| ExperimentError::Io { path, error })
+    }
+
     fn write(&self, name: &str, text: String) -> Result<(), ExperimentError> {
         let path = self.path(name);
         write_whole(&path, text.as_bytes()).map_err(|error| ExperimentError::Io { path, error })
@@ -232,16 +238,6 @@ impl Runner<'_> {
     fn collect_settings(&self) -> String {
         let c = self.config;
         settings(("collect", env!("CARGO_PKG_VERSION"), &c.collect, &c.evaluate.types))
-    }
-
-    /// Checks that the models given can be loaded; their checksums.
-    fn given_models(&self) -> Result<Vec<String>, ExperimentError> {
-        let files = self.model_files();
-        Models::load(&files).map_err(|error| match error {
-            ModelsError::Load(error) => ExperimentError::GivenModels(error),
-            error => error.into(),
-        })?;
-        given::checksums(&files)
     }
 
     /// Collects the data set; what identifies it.
@@ -270,6 +266,7 @@ impl Runner<'_> {
 
     /// Trains from the data set that `data` identifies.
     fn train(&self, data: &str, read: &mut Option<Dataset>) -> Result<(), ExperimentError> {
+        self.make_folder(self.path("models"))?;
         let kinds = &self.config.evaluate.types;
         let knn = self.model("knn.bin");
         let knn_settings = settings(("knn", data));
@@ -324,8 +321,7 @@ impl Runner<'_> {
                 continue;
             }
             tracing::info!("{stage}: part {} of {}", i + 1, curve.parts.len());
-            std::fs::create_dir_all(&folder)
-                .map_err(|error| ExperimentError::Io { path: folder.clone(), error })?;
+            self.make_folder(folder.clone())?;
             let new = learning_curve::points(c, curve, self.dataset(read)?, part, &folder)
                 .map_err(|error| ExperimentError::Part { part: i, error: Box::new(error) })?;
             self.write(&format!("learning-curve/{i}/points.json"), to_json(&new))?;
@@ -372,15 +368,15 @@ impl Runner<'_> {
     }
 
     /// Models, scenes and settings of the evaluation, checked.
-    fn ready(&self) -> Result<(Models, Vec<Case>, SuiteConfig), ExperimentError> {
+    fn ready(&self) -> Result<Ready, ExperimentError> {
         let e = &self.config.evaluate;
-        let models = Models::load(&self.model_files())?;
-        let suite_config = SuiteConfig {
-            methods: e.methods.clone(),
-            settings: MethodSettings { planner: e.planner, n3p: e.n3p },
-            max_expansions: e.max_expansions,
-            threads: 1,
-        };
+        let models = Models::load(&self.model_files()).map_err(|error| match error {
+            ModelsError::Load(error) if self.given.models.is_some() => {
+                ExperimentError::GivenModels(error)
+            }
+            error => error.into(),
+        })?;
+        let suite_config = e.suite(&e.methods);
         let vehicle = &self.config.vehicle;
         let cases = suite::generated(vehicle, &e.types, &e.levels, e.count, e.seed)?;
         suite::check(&cases, &models, &suite_config)?;
@@ -388,11 +384,15 @@ impl Runner<'_> {
     }
 
     /// Runs the methods with the models that `trained` identifies.
-    fn evaluate(&self, trained: &str, curve: &[CurvePoint]) -> Result<Vec<Row>, ExperimentError> {
+    fn evaluate(
+        &self,
+        (models, cases, suite_config): Ready,
+        trained: &str,
+        curve: &[CurvePoint],
+    ) -> Result<Vec<Row>, ExperimentError> {
         let (e, name) = (&self.config.evaluate, &self.config.name);
         // The report shows the curve, too.
         let settings = settings(("evaluate", trained, &self.config.vehicle, e, name, curve));
-        let (models, cases, suite_config) = self.ready()?;
         let rows_csv = self.path("rows.csv");
         match self.stages.begin("evaluate", &settings, rows_csv.exists())? {
             Todo::Nothing => return Ok(read_csv(&rows_csv)?),
