@@ -21,6 +21,7 @@
 //! - [`world`]: scenes, exact swept collision, cells, the abstraction, the generator
 //! - [`planners`]: the `Planner` trait and Hybrid A* with Reeds-Shepp expansion
 //! - [`selectors`]: preparatory poses by KNN and MLP, and N3P itself
+//! - [`rl`]: policies of reinforcement learning, and the environment they park in
 //! - [`dataset`]: collecting samples into Parquet, and reading them back
 //! - [`training`]: rows → artefacts
 //! - [`evaluation`]: episodes, the independent oracle, tables, reports
@@ -38,6 +39,7 @@ pub mod files;
 pub mod geometry;
 pub mod planners;
 pub mod progress;
+pub mod rl;
 pub mod rng;
 pub mod selectors;
 pub mod training;
