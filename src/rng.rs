@@ -25,6 +25,14 @@ pub enum Stream {
     Bootstrap = 6,
     /// Starts and trials in the choice of what a network learns.
     Targets = 7,
+    /// An abstracted environment to learn parking in.
+    Course = 8,
+    /// Which kind of environment comes next in reinforcement learning.
+    Strata = 9,
+    /// What a policy draws: its actions' noise.
+    Policy = 10,
+    /// Which transitions a step of reinforcement learning looks at, and its noise.
+    Replay = 11,
 }
 
 /// The generator of `(seed, stream, index)`.

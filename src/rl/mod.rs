@@ -2,10 +2,20 @@
 //!
 //! A [`Policy`] sees an [`Observation`] and answers with an [`Action`].
 //!
+//! `senses` makes observations with the [`lidar`] and the mask of [`motion`]; [`parking_env`] is what
+//! agents learn in, on problems of [`courses`].
+//!
 //! Source: M. Jiang et al., "HOPE: A Reinforcement Learning-based Hybrid Policy Path Planner for
 //! Diverse Parking Scenarios", which the paper compares with.
 
+pub mod courses;
+pub mod lidar;
+pub mod motion;
+pub mod parking_env;
+mod senses;
+
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 
 /// Beams of the lidar: beam `i` points at `3 i` degrees counter-clockwise from the heading.
 pub const BEAMS: usize = 120;
@@ -35,7 +45,7 @@ pub struct Observation {
 }
 
 /// What a policy does for one step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Action {
     /// Steering angle over the steering limit, −1 (full right) to 1 (full left).
     pub steer: f64,

@@ -3,6 +3,8 @@
 //! Kinematic bicycle, pose at the rear-axle centre (paper eq. 1): curvature
 //! `κ = tan δ / wheelbase`.
 
+mod overlap;
+
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Aabb, Polygon, Pose};
