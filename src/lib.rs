@@ -20,6 +20,7 @@
 //! - [`curves`]: segments, paths, Reeds-Shepp words
 //! - [`world`]: scenes, exact swept collision, cells, the abstraction, the generator
 //! - [`planners`]: the `Planner` trait and Hybrid A* with Reeds-Shepp expansion
+//! - [`nn`]: pieces of neural networks
 //! - [`selectors`]: preparatory poses by KNN and MLP, and N3P itself
 //! - [`rl`]: policies of reinforcement learning, and the environment they park in
 //! - [`dataset`]: collecting samples into Parquet, and reading them back
@@ -37,6 +38,7 @@ pub mod evaluation;
 pub mod experiments;
 pub mod files;
 pub mod geometry;
+pub mod nn;
 pub mod planners;
 pub mod progress;
 pub mod rl;

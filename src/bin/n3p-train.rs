@@ -4,10 +4,13 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use clap::{Args, Parser, Subcommand};
+use candle_core::Device;
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::dataset::Dataset;
+use n3p::rl::courses::{Course, Stratum};
 use n3p::selectors::artefact;
+use n3p::training::rl::{Begin, RlConfig};
 use n3p::training::{self, MlpConfig, TrainingError};
 use n3p::world::ParkingType;
 
@@ -30,6 +33,12 @@ enum Command {
     ///
     /// A model card and a training log are written beside the model.
     Knn(KnnArgs),
+    /// Trains a driving policy by soft actor-critic
+    ///
+    /// May be interrupted at any moment: the best policy so far is in its file, and --resume goes
+    /// on from the last checkpoint to the same end. A model card, a training log and the curve
+    /// are written beside it.
+    Rl(RlArgs),
 }
 
 #[derive(Args)]
@@ -66,12 +75,44 @@ struct KnnArgs {
     out: PathBuf,
 }
 
+#[derive(Args)]
+struct RlArgs {
+    /// Where it learns: in abstracted environments (simple) or in generated scenes (eval)
+    #[arg(long = "env", value_name = "ENV")]
+    course: Course,
+    /// Episodes; overrides the settings
+    #[arg(long, value_name = "N")]
+    episodes: Option<usize>,
+    /// Seed of problems, weights and noise; overrides the settings
+    #[arg(long, value_name = "S")]
+    seed: Option<u64>,
+    /// Policy file [default: models/rl-ENV.safetensors]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Settings of the training, a TOML file; the defaults when omitted
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Go on from the checkpoint beside the policy file, if there is one
+    #[arg(long)]
+    resume: bool,
+    /// Where tensors are computed; cuda needs a build with the feature "cuda"
+    #[arg(long, value_enum, default_value_t = DeviceName::Cpu)]
+    device: DeviceName,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum DeviceName {
+    Cpu,
+    Cuda,
+}
+
 fn main() -> ExitCode {
     training::single_threaded();
     let cli = cli::parse::<Cli>();
     cli::run(|| match &cli.command {
         Command::Mlp(args) => mlp(args),
         Command::Knn(args) => knn(args),
+        Command::Rl(args) => rl(args),
     })
 }
 
@@ -131,6 +172,51 @@ fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
     let (size, seconds) = (log.bytes as f64 / f64::from(1 << 20), begin.elapsed().as_secs_f64());
     cli::print(format!("{}: {size:.2} MiB, built in {seconds:.2} s", args.out.display()))?;
     Ok(ExitCode::SUCCESS)
+}
+
+fn rl(args: &RlArgs) -> anyhow::Result<ExitCode> {
+    let mut config = match &args.config {
+        Some(path) => RlConfig::read(path).or_bad_input()?,
+        None => RlConfig::default(),
+    };
+    config.episodes = args.episodes.unwrap_or(config.episodes);
+    config.seed = args.seed.unwrap_or(config.seed);
+    config.validate().or_bad_input()?;
+    let default = || PathBuf::from(format!("models/rl-{}.safetensors", args.course.name()));
+    let out = args.out.clone().unwrap_or_else(default);
+    artefact::check_writable(&out).or_bad_input()?;
+    let device = args.device.open()?;
+    let begin = if args.resume { Begin::Resume } else { Begin::Anew };
+    let log = training::rl::train(args.course, &config, &out, begin, &device)
+        .map_err(|e| if e.is_bad_input() { BadInput(e.to_string()).into() } else { anyhow::Error::from(e) })?;
+    let best = &log.points[log.best];
+    let problems = Stratum::COUNT * config.validation_count;
+    cli::print(format!(
+        "{}: the best of {} points is that of {} episodes, which parks in {} of {problems} \
+         validation problems; {} steps, {} updates in all",
+        out.display(),
+        log.points.len(),
+        best.episodes,
+        best.validated(),
+        log.points.last().map_or(0, |p| p.steps),
+        log.points.last().map_or(0, |p| p.updates),
+    ))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+impl DeviceName {
+    fn open(self) -> anyhow::Result<Device> {
+        match self {
+            Self::Cpu => Ok(Device::Cpu),
+            Self::Cuda if !cfg!(feature = "cuda") => {
+                let text = "--device cuda: this build has no CUDA; build with --features cuda, \
+                            or use --device cpu";
+                Err(BadInput(text.to_owned()).into())
+            }
+            Self::Cuda => Device::new_cuda(0)
+                .map_err(|e| BadInput(format!("--device cuda: no device to use: {e}")).into()),
+        }
+    }
 }
 
 /// The data set, and the parking types to train: the one asked for or all it holds.

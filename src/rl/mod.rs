@@ -8,10 +8,16 @@
 //! Source: M. Jiang et al., "HOPE: A Reinforcement Learning-based Hybrid Policy Path Planner for
 //! Diverse Parking Scenarios", which the paper compares with.
 
+pub mod actor;
 pub mod courses;
+pub mod encoding;
 pub mod lidar;
 pub mod motion;
+pub mod network;
 pub mod parking_env;
+pub mod policy_file;
+pub mod replay;
+pub mod sac;
 mod senses;
 
 use rand_chacha::ChaCha8Rng;

@@ -52,6 +52,12 @@ pub enum Fault {
     /// Neither kind of model.
     #[error("not a model: the content is neither a knn.bin nor a safetensors file of n3p-train")]
     NotAModel,
+    /// A policy, where a selector of preparatory poses is wanted.
+    #[error("it holds a driving policy, no selector; give it with --policy")]
+    Policy,
+    /// A selector of preparatory poses, where a policy is wanted.
+    #[error("it holds a selector of preparatory poses, no policy; give it with --model")]
+    Selector,
     /// Written by another version of this program.
     #[error(
         "format version {found}, but this program reads version {supported}; \

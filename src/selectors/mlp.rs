@@ -1,24 +1,20 @@
 //! Preparatory poses predicted by the paper's network, one network per parking type.
 //!
 //! A network is one safetensors file `mlp-TYPE.safetensors`: `layers.N.weight`
-//! (`[outputs, inputs]`) and `layers.N.bias` (`[outputs]`) in single precision, N = 0…4, and
-//! one metadata entry `n3p`, a JSON object `{"sha256": …, "header": …}`. The header is an
-//! [`MlpHeader`]; the checksum covers the header's text and all tensor bytes.
+//! (`[outputs, inputs]`) and `layers.N.bias` (`[outputs]`) in single precision, N = 0…4, with an
+//! [`MlpHeader`] as [`super::tensor_file`] says.
 //!
 //! Read next: [`super::network`] for the evaluation.
 
-use std::collections::HashMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use safetensors::tensor::TensorView;
-use safetensors::{Dtype, SafeTensorError, SafeTensors};
 use serde::{Deserialize, Serialize};
 
 use super::artefact::{self, ArtefactError, Fault};
 use super::network::{self, LAYERS, LayerWeights, Network, OUTPUTS};
+use super::tensor_file::{self, NamedTensor};
 use super::{Features, Normaliser, PoseSelector};
-use crate::files::sha256_hex;
 use crate::geometry::Pose;
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
@@ -26,8 +22,6 @@ use crate::world::cell::Grid;
 
 /// The format version written and read by this program.
 pub const VERSION: u32 = 1;
-
-const METADATA_KEY: &str = "n3p";
 
 /// What a network's file says about itself.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -59,41 +53,17 @@ pub struct MlpHeader {
     pub crate_version: String,
 }
 
-/// Only the version, so that a file of another version is called that and not damaged.
-#[derive(Deserialize)]
-struct Versioned {
-    header: VersionOnly,
-}
-
-#[derive(Deserialize)]
-struct VersionOnly {
-    format_version: u32,
-}
-
 /// The bytes of a file: the same input gives the same bytes.
 ///
 /// Panics when `weights` are not those of [`LAYERS`].
 pub fn encode(header: &MlpHeader, weights: &[LayerWeights]) -> Vec<u8> {
-    let bytes =
-        |values: &[f32]| -> Vec<u8> { values.iter().flat_map(|v| v.to_le_bytes()).collect() };
-    let mut tensors: Vec<(String, Vec<usize>, Vec<u8>)> = Vec::new();
+    let mut tensors = Vec::new();
     for (n, (layer, size)) in weights.iter().zip(LAYERS.windows(2)).enumerate() {
-        tensors.push((name(n, "bias"), vec![size[1]], bytes(&layer.bias)));
-        tensors.push((name(n, "weight"), vec![size[1], size[0]], bytes(&layer.weight)));
+        tensors.push(NamedTensor::f32(name(n, "bias"), vec![size[1]], &layer.bias));
+        tensors.push(NamedTensor::f32(name(n, "weight"), vec![size[1], size[0]], &layer.weight));
     }
-    // Sorted by name, as safetensors lays them out.
     let header = serde_json::to_string(header).expect("a header is plain data");
-    let mut parts = vec![header.as_bytes()];
-    parts.extend(tensors.iter().map(|(_, _, data)| data.as_slice()));
-    let sum = sha256_hex(&parts);
-    // One entry only: safetensors writes several in random order.
-    let entry = format!("{{\"sha256\":\"{sum}\",\"header\":{header}}}");
-    let metadata = HashMap::from([(METADATA_KEY.to_owned(), entry)]);
-    let views = tensors.iter().map(|(name, shape, data)| {
-        let view = TensorView::new(Dtype::F32, shape.clone(), data);
-        (name, view.expect("weights of the paper's layers"))
-    });
-    safetensors::serialize(views, Some(metadata)).expect("ten tensors are within the format")
+    tensor_file::encode(&header, tensors)
 }
 
 fn name(layer: usize, part: &str) -> String {
@@ -202,75 +172,25 @@ impl PoseSelector for MlpSelector {
 }
 
 fn decode(bytes: &[u8]) -> Result<(MlpHeader, Vec<LayerWeights>), Fault> {
-    let (data_at, entry) = metadata(bytes)?;
-    let versioned: Versioned =
-        serde_json::from_str(&entry).map_err(|e| Fault::Header(e.to_string()))?;
-    let found = versioned.header.format_version;
-    if found != VERSION {
-        return Err(Fault::Version { found, supported: VERSION });
+    let (json, tensors) = tensor_file::decode(bytes, VERSION, parameter_bytes())?;
+    if tensor_file::is_policy(&json) {
+        return Err(Fault::Policy);
     }
-    let (sum, json) = split_entry(&entry)
-        .ok_or_else(|| Fault::Header("no checksum before the header".to_owned()))?;
-    if sum != sha256_hex(&[json.as_bytes(), &bytes[data_at..]]) {
-        return Err(Fault::Checksum);
-    }
-    let header: MlpHeader = serde_json::from_str(json).map_err(|e| Fault::Header(e.to_string()))?;
+    let header: MlpHeader = serde_json::from_str(&json).map_err(|e| Fault::Header(e.to_string()))?;
     check_header(&header).map_err(Fault::Header)?;
-    let tensors = SafeTensors::deserialize(bytes).map_err(|e| Fault::Header(e.to_string()))?;
     let layers = LAYERS.windows(2).enumerate().map(|(n, size)| {
         Ok(LayerWeights {
-            weight: tensor(&tensors, &name(n, "weight"), &[size[1], size[0]])?,
-            bias: tensor(&tensors, &name(n, "bias"), &[size[1]])?,
+            weight: tensor_file::f32s(&tensors, &name(n, "weight"), &[size[1], size[0]])?,
+            bias: tensor_file::f32s(&tensors, &name(n, "bias"), &[size[1]])?,
         })
     });
     let layers = layers.collect::<Result<Vec<_>, Fault>>()?;
     Ok((header, layers))
 }
 
-/// Where the tensor data begin, and the metadata entry of this program.
-fn metadata(bytes: &[u8]) -> Result<(usize, String), Fault> {
-    const LENGTH: usize = 8;
-    if bytes.is_empty() {
-        return Err(Fault::Empty);
-    }
-    let got = bytes.len() as u64;
-    if bytes.len() <= LENGTH || bytes[LENGTH] != b'{' {
-        return Err(Fault::NotAModel);
-    }
-    let header_len = u64::from_le_bytes(bytes[..LENGTH].try_into().expect("eight bytes"));
-    let data_at = header_len.saturating_add(LENGTH as u64);
-    if data_at > got {
-        return Err(Fault::Length { expected: data_at, got });
-    }
-    match SafeTensors::read_metadata(bytes) {
-        Ok((_, metadata)) => {
-            let expected = data_at + metadata.data_len() as u64;
-            if expected != got {
-                return Err(Fault::Length { expected, got });
-            }
-            let entry = metadata.metadata().as_ref().and_then(|m| m.get(METADATA_KEY));
-            Ok((data_at as usize, entry.ok_or(Fault::NotAModel)?.clone()))
-        }
-        Err(SafeTensorError::MetadataIncompleteBuffer) => {
-            let expected = data_at + parameter_bytes();
-            if expected == got {
-                return Err(Fault::Header("the tensors do not fill the file".to_owned()));
-            }
-            Err(Fault::Length { expected, got })
-        }
-        Err(e) => Err(Fault::Header(e.to_string())),
-    }
-}
-
 /// Size of all weights and biases, bytes.
 fn parameter_bytes() -> u64 {
     LAYERS.windows(2).map(|size| 4 * (size[0] * size[1] + size[1]) as u64).sum()
-}
-
-/// The parts of `{"sha256":"…","header":…}`.
-fn split_entry(entry: &str) -> Option<(&str, &str)> {
-    let (sum, header) = entry.strip_prefix("{\"sha256\":\"")?.split_once("\",\"header\":")?;
-    Some((sum, header.strip_suffix('}')?))
 }
 
 fn check_header(header: &MlpHeader) -> Result<(), String> {
@@ -286,18 +206,3 @@ fn check_header(header: &MlpHeader) -> Result<(), String> {
     header.output.check(OUTPUTS).map_err(|e| format!("output {e}"))
 }
 
-fn tensor(file: &SafeTensors, name: &str, shape: &[usize]) -> Result<Vec<f32>, Fault> {
-    let expected = format!("F32 {shape:?}");
-    let wrong =
-        |got: String| Fault::Shape { tensor: name.to_owned(), expected: expected.clone(), got };
-    let view = file.tensor(name).map_err(|_| wrong("nothing".to_owned()))?;
-    if view.dtype() != Dtype::F32 || view.shape() != shape {
-        return Err(wrong(format!("{:?} {:?}", view.dtype(), view.shape())));
-    }
-    let (chunks, _) = view.data().as_chunks::<4>();
-    let values: Vec<f32> = chunks.iter().map(|b| f32::from_le_bytes(*b)).collect();
-    match values.iter().find(|v| !v.is_finite()) {
-        Some(&value) => Err(Fault::NotFinite { tensor: name.to_owned(), value }),
-        None => Ok(values),
-    }
-}

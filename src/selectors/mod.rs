@@ -13,6 +13,7 @@ pub mod knn_file;
 pub mod mlp;
 pub mod network;
 mod normaliser;
+pub mod tensor_file;
 
 pub use features::Features;
 pub use normaliser::Normaliser;

@@ -18,7 +18,7 @@ use rand::seq::SliceRandom;
 use serde::{Deserialize, Serialize};
 
 use super::curve::{self, EpochLoss};
-use super::optimiser::AdamW;
+use crate::nn::AdamW;
 use super::quality::{Errors, Reach, errors, reach};
 use super::targets::{self, Example};
 use super::{Loss, MlpConfig, TrainingError, Validation, card, solved, write_beside};

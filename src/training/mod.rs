@@ -1,7 +1,7 @@
 //! Rows of a data set → model files.
 //!
 //! [`knn`] stores samples and a [`library`] of their manoeuvres; [`mlp`] trains a network, with
-//! [`optimiser`] and [`curve`] as its helpers. Both take samples and metadata of one data set
+//! [`curve`] as its helper. Both take samples and metadata of one data set
 //! and write an artefact that [`crate::selectors`] loads. Beside it they leave what programs
 //! and people want to know of it: a log ([`log_path`]), with its [`quality`], and a model card
 //! ([`card_path`]).
@@ -13,8 +13,8 @@ mod leave_one_out;
 pub mod library;
 pub mod mlp;
 mod mlp_config;
-pub mod optimiser;
 pub mod quality;
+pub mod rl;
 mod targets;
 
 pub use mlp_config::{Loss, MlpConfig, Schedule, Targets, Validation};
@@ -85,6 +85,21 @@ pub enum TrainingError {
         /// The loss.
         loss: f32,
     },
+    /// A checkpoint where a training is to begin anew.
+    #[error(
+        "{}: a checkpoint is here already: go on from it with --resume, remove it, or choose \
+         another --out", .0.display()
+    )]
+    CheckpointInTheWay(PathBuf),
+    /// A checkpoint of a training with other settings.
+    #[error(
+        "{}: the checkpoint is of a training with other settings; give the same settings (only \
+         episodes may differ), or choose another --out", .0.display()
+    )]
+    OtherCheckpoint(PathBuf),
+    /// A training that ended before anything was learnt.
+    #[error("all episodes went by while warming up; expected more episodes or a smaller warm_up")]
+    OnlyWarmUp,
     /// The model file.
     #[error(transparent)]
     Artefact(#[from] ArtefactError),

@@ -36,6 +36,27 @@ impl AdamW {
         Ok(Self { slots, steps: 0, weight_decay: weight_decay as f32 })
     }
 
+    /// Steps so far, then mean and square of the gradients of each variable in turn: with the
+    /// variables' values all that later steps depend on.
+    pub fn state(&self) -> (i32, Vec<f32>) {
+        let moments = self.slots.iter().flat_map(|s| s.mean.iter().chain(&s.square));
+        (self.steps, moments.copied().collect())
+    }
+
+    /// Goes on from a [`AdamW::state`] of the same variables; `None` where the lengths differ.
+    pub fn restore(&mut self, (steps, moments): (i32, &[f32])) -> Option<()> {
+        let mut rest = moments;
+        for slot in &mut self.slots {
+            for moment in [&mut slot.mean, &mut slot.square] {
+                let (own, others) = rest.split_at_checked(moment.len())?;
+                moment.copy_from_slice(own);
+                rest = others;
+            }
+        }
+        self.steps = steps;
+        rest.is_empty().then_some(())
+    }
+
     /// One step down the gradients.
     pub fn step(&mut self, gradients: &GradStore, rate: f64) -> candle_core::Result<()> {
         self.steps += 1;

@@ -1,0 +1,152 @@
+//! Safetensors files that say what they are and notice damage.
+//!
+//! One metadata entry `n3p` holds a JSON object `{"sha256": …, "header": …}`. The header is an
+//! object with a `format_version`; the checksum covers the header's text and all tensor bytes.
+
+use std::collections::HashMap;
+
+use safetensors::tensor::TensorView;
+use safetensors::{Dtype, SafeTensorError, SafeTensors};
+use serde::Deserialize;
+
+use super::artefact::Fault;
+use crate::files::sha256_hex;
+
+const METADATA_KEY: &str = "n3p";
+
+/// A tensor to write.
+pub struct NamedTensor {
+    name: String,
+    dtype: Dtype,
+    shape: Vec<usize>,
+    bytes: Vec<u8>,
+}
+
+impl NamedTensor {
+    /// Of single precision. Panics when `values` do not fill `shape`.
+    pub fn f32(name: String, shape: Vec<usize>, values: &[f32]) -> Self {
+        assert_eq!(values.len(), shape.iter().product::<usize>(), "{name}");
+        let bytes = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        Self { name, dtype: Dtype::F32, shape, bytes }
+    }
+
+    /// Of bytes.
+    pub fn u8(name: String, bytes: Vec<u8>) -> Self {
+        Self { name, dtype: Dtype::U8, shape: vec![bytes.len()], bytes }
+    }
+}
+
+/// The bytes of a file: the same header and tensors give the same bytes.
+pub fn encode(header: &str, mut tensors: Vec<NamedTensor>) -> Vec<u8> {
+    // As safetensors lays them out, so that the checksum can be taken here.
+    tensors.sort_by(|a, b| (b.dtype, &a.name).cmp(&(a.dtype, &b.name)));
+    let mut parts = vec![header.as_bytes()];
+    parts.extend(tensors.iter().map(|t| t.bytes.as_slice()));
+    let sum = sha256_hex(&parts);
+    // One entry only: safetensors writes several in random order.
+    let entry = format!("{{\"sha256\":\"{sum}\",\"header\":{header}}}");
+    let metadata = HashMap::from([(METADATA_KEY.to_owned(), entry)]);
+    let views = tensors.iter().map(|t| {
+        let view = TensorView::new(t.dtype, t.shape.clone(), &t.bytes);
+        (&t.name, view.expect("as many bytes as the shape says"))
+    });
+    safetensors::serialize(views, Some(metadata)).expect("tensors are within the format")
+}
+
+/// Only the version, so that a file of another version is called that and not damaged.
+#[derive(Deserialize)]
+struct Versioned {
+    header: VersionOnly,
+}
+
+#[derive(Deserialize)]
+struct VersionOnly {
+    format_version: u32,
+}
+
+/// The header's text and the tensors of a file, its checksum and version checked. `data_len`:
+/// bytes of tensors that a whole file holds, for the message about one that is cut off.
+pub fn decode(bytes: &[u8], version: u32, data_len: u64) -> Result<(String, SafeTensors<'_>), Fault> {
+    let (data_at, entry) = metadata(bytes, data_len)?;
+    let versioned: Versioned =
+        serde_json::from_str(&entry).map_err(|e| Fault::Header(e.to_string()))?;
+    let found = versioned.header.format_version;
+    if found != version {
+        return Err(Fault::Version { found, supported: version });
+    }
+    let (sum, json) = split_entry(&entry)
+        .ok_or_else(|| Fault::Header("no checksum before the header".to_owned()))?;
+    if sum != sha256_hex(&[json.as_bytes(), &bytes[data_at..]]) {
+        return Err(Fault::Checksum);
+    }
+    let tensors = SafeTensors::deserialize(bytes).map_err(|e| Fault::Header(e.to_string()))?;
+    Ok((json.to_owned(), tensors))
+}
+
+/// Where the tensor data begin, and the metadata entry of this program.
+fn metadata(bytes: &[u8], data_len: u64) -> Result<(usize, String), Fault> {
+    const LENGTH: usize = 8;
+    if bytes.is_empty() {
+        return Err(Fault::Empty);
+    }
+    let got = bytes.len() as u64;
+    if bytes.len() <= LENGTH || bytes[LENGTH] != b'{' {
+        return Err(Fault::NotAModel);
+    }
+    let header_len = u64::from_le_bytes(bytes[..LENGTH].try_into().expect("eight bytes"));
+    let data_at = header_len.saturating_add(LENGTH as u64);
+    if data_at > got {
+        return Err(Fault::Length { expected: data_at, got });
+    }
+    match SafeTensors::read_metadata(bytes) {
+        Ok((_, metadata)) => {
+            let expected = data_at + metadata.data_len() as u64;
+            if expected != got {
+                return Err(Fault::Length { expected, got });
+            }
+            let entry = metadata.metadata().as_ref().and_then(|m| m.get(METADATA_KEY));
+            Ok((data_at as usize, entry.ok_or(Fault::NotAModel)?.clone()))
+        }
+        Err(SafeTensorError::MetadataIncompleteBuffer) => {
+            let expected = data_at + data_len;
+            if expected == got {
+                return Err(Fault::Header("the tensors do not fill the file".to_owned()));
+            }
+            Err(Fault::Length { expected, got })
+        }
+        Err(e) => Err(Fault::Header(e.to_string())),
+    }
+}
+
+/// The parts of `{"sha256":"…","header":…}`.
+fn split_entry(entry: &str) -> Option<(&str, &str)> {
+    let (sum, header) = entry.strip_prefix("{\"sha256\":\"")?.split_once("\",\"header\":")?;
+    Some((sum, header.strip_suffix('}')?))
+}
+
+/// Whether a header is that of a policy.
+pub fn is_policy(header: &str) -> bool {
+    #[derive(Deserialize)]
+    struct Policy {
+        #[serde(rename = "course")]
+        _course: serde::de::IgnoredAny,
+    }
+    serde_json::from_str::<Policy>(header).is_ok()
+}
+
+/// The finite values of a tensor of single precision and this shape.
+pub fn f32s(file: &SafeTensors, name: &str, shape: &[usize]) -> Result<Vec<f32>, Fault> {
+    let expected = format!("F32 {shape:?}");
+    let wrong =
+        |got: String| Fault::Shape { tensor: name.to_owned(), expected: expected.clone(), got };
+    let view = file.tensor(name).map_err(|_| wrong("nothing".to_owned()))?;
+    if view.dtype() != Dtype::F32 || view.shape() != shape {
+        return Err(wrong(format!("{:?} {:?}", view.dtype(), view.shape())));
+    }
+    let (chunks, _) = view.data().as_chunks::<4>();
+    let values: Vec<f32> = chunks.iter().map(|b| f32::from_le_bytes(*b)).collect();
+    match values.iter().find(|v| !v.is_finite()) {
+        Some(&value) => Err(Fault::NotFinite { tensor: name.to_owned(), value }),
+        None => Ok(values),
+    }
+}

@@ -1,0 +1,3 @@
+use super::log::RlLog;
+use std::path::Path;
+pub(super) fn card(_out: &Path, _log: &RlLog) -> String { String::new() }
