@@ -65,6 +65,14 @@ pub fn print(text: impl Display) -> anyhow::Result<()> {
     }
 }
 
+/// Parses a positive, finite number of seconds, at most a day.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    let expected = "expected a number of seconds above 0 and up to 86400";
+    let seconds: f64 = text.parse().map_err(|_| expected.to_owned())?;
+    let fine = seconds > 0.0 && seconds <= 86_400.0;
+    fine.then_some(seconds).ok_or_else(|| expected.to_owned())
+}
+
 /// Runs a binary's body and maps its error to stderr and an exit code.
 pub fn run(body: impl FnOnce() -> anyhow::Result<ExitCode>) -> ExitCode {
     let filter = EnvFilter::try_from_env("N3P_LOG").unwrap_or_else(|_| EnvFilter::new("info"));

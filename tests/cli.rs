@@ -74,7 +74,7 @@ fn a_missing_scene_and_a_wrong_method_are_refused() {
         .args(["--scene", "s.json", "--method", "rl-simple"])
         .assert()
         .code(2)
-        .stderr(contains("not available in this version").and(contains("mhha")));
+        .stderr(contains("rl-simple.safetensors").and(contains("n3p-train rl --env simple")));
     command("n3p-plan", dir.path())
         .args(["--scene", "s.json", "--method", "n3p"])
         .assert()
@@ -166,7 +166,12 @@ fn eval_refuses_bad_arguments() {
         (&["--level", "hard"], &["hard", "extreme"]),
         (&["--methods", "ha-rs,nope"], &["nope", "n3p"]),
         (&["--methods", "knn-n3p"], &["--model", "n3p-train knn"]),
-        (&["--methods", "rl-eval"], &["not available in this version"]),
+        (&["--methods", "rl-eval"], &["rl-eval.safetensors", "n3p-train rl --env eval"]),
+        (&["--methods", "policy"], &["--policy FILE.onnx", "docs/policies.md"]),
+        (&["--policy", "none.onnx"], &["none.onnx", "no such file"]),
+        (&["--policy", "no-such-program --fast"], &["no-such-program"]),
+        (&["--policy", "file", "--policy-limit", "-1"], &["--policy-limit", "above 0"]),
+        (&["--policy-limit", "2"], &["--policy"]),
         (&["--model", "none.bin"], &["none.bin", "n3p-train"]),
         (&["--model", "file"], &["file", "empty"]),
         (&["--model", "text.bin"], &["text.bin"]),

@@ -4,9 +4,12 @@ use std::path::Path;
 
 use n3p::dataset::{CollectConfig, Dataset};
 use n3p::experiments::ExperimentConfig;
+use n3p::rl::courses::Course;
+use n3p::rl::policy_file;
 use n3p::selectors::knn::KnnSelector;
 use n3p::selectors::mlp::MlpSelector;
 use n3p::training::MlpConfig;
+use n3p::training::rl::{RlConfig, RlLog};
 use n3p::world::ParkingType;
 
 fn data(name: &str) -> Dataset {
@@ -43,5 +46,25 @@ fn the_models_come_from_the_papers_data_set_and_settings() {
         let header = network.headers().next().unwrap();
         assert_eq!(header.data_sha256, data.content_sha256(&[kind]), "{file}");
         assert_eq!(header.training, serde_json::to_value(&training).unwrap(), "{file}");
+    }
+}
+
+#[test]
+fn the_policies_come_from_the_papers_settings() {
+    let experiment = ExperimentConfig::read("experiments/paper.toml".as_ref()).unwrap();
+    let training = RlConfig::read("models/rl.toml".as_ref()).unwrap();
+    assert_eq!(training, experiment.train.rl);
+    assert_ne!(training.seed, experiment.evaluate.seed);
+    assert_ne!(training.validation_seed, experiment.evaluate.seed);
+    for course in [Course::Simple, Course::Eval] {
+        let path = Path::new("models").join(policy_file::usual_name(course));
+        assert!(path.metadata().unwrap().len() < 5 << 20);
+        let (header, _) = policy_file::load(&path).unwrap();
+        assert_eq!((header.course, header.vehicle), (course, experiment.vehicle));
+        assert_eq!(header.training, serde_json::to_value(&training).unwrap());
+        let log = std::fs::read_to_string(path.with_extension("training.json")).unwrap();
+        let log: RlLog = serde_json::from_str(&log).unwrap();
+        assert_eq!(header.episodes, log.best().episodes);
+        assert!(log.points.last().unwrap().episodes >= training.episodes);
     }
 }

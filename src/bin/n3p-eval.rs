@@ -10,6 +10,7 @@ use n3p::evaluation::report::{self, Provenance};
 use n3p::evaluation::suite::{self, SuiteConfig};
 use n3p::evaluation::{Case, Method, MethodSettings, Models, Outputs, metrics};
 use n3p::progress;
+use n3p::rl::source::PolicySource;
 use n3p::world::{Level, ParkingType};
 
 /// Evaluates planning methods on generated scenes, or on a folder of scene files.
@@ -20,6 +21,13 @@ struct Args {
     /// working folder, then in models/.
     #[arg(long = "model", value_name = "FILE")]
     models: Vec<String>,
+    /// A driving policy from outside, the method "policy": an .onnx file, or the command of a
+    /// program (see docs/policies.md).
+    #[arg(long, value_name = "FILE|COMMAND")]
+    policy: Option<String>,
+    /// Seconds that the program of --policy may take for an answer.
+    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, requires = "policy", value_parser = cli::seconds)]
+    policy_limit: f64,
     /// Parking type [default: all that the models know].
     #[arg(long = "type", value_enum, value_name = "TYPE")]
     kind: Option<ParkingType>,
@@ -60,7 +68,9 @@ fn main() -> ExitCode {
 }
 
 fn evaluate(args: &Args) -> Result<ExitCode> {
-    let models = Models::load(&args.models).or_bad_input()?;
+    let policy = args.policy.as_deref().map(|p| PolicySource::new(p, args.policy_limit));
+    let models =
+        Models::load(&args.models).or_bad_input()?.with_policy(policy.transpose().or_bad_input()?);
     let config = SuiteConfig {
         methods: match &args.methods[..] {
             [] => Method::available(&models),

@@ -59,11 +59,19 @@ struct GivenArgs {
     /// mlp-TYPE.safetensors
     #[arg(long, value_name = "DIR", conflicts_with = "data")]
     models: Option<PathBuf>,
+    /// Folder of policies (rl-ENV.safetensors) to evaluate instead of training them, where the
+    /// other models are made
+    #[arg(long, value_name = "DIR", conflicts_with = "models")]
+    policies: Option<PathBuf>,
 }
 
 impl From<&GivenArgs> for Given {
     fn from(args: &GivenArgs) -> Self {
-        Self { data: args.data.clone(), models: args.models.clone() }
+        Self {
+            data: args.data.clone(),
+            models: args.models.clone(),
+            policies: args.policies.clone(),
+        }
     }
 }
 

@@ -13,6 +13,7 @@ use n3p::evaluation::{
 };
 use n3p::files::{check_writable, reason, write_whole};
 use n3p::planners::Problem;
+use n3p::rl::source::PolicySource;
 use n3p::world::Scene;
 
 /// Plans a path for one parking scene.
@@ -28,9 +29,16 @@ struct Args {
     #[arg(long, value_name = "NAME")]
     method: Option<Method>,
     /// A trained model; may be given several times [default: knn.bin, or
-    /// mlp-TYPE.safetensors, in the working folder or in models/].
+    /// mlp-TYPE.safetensors or rl-ENV.safetensors, in the working folder or in models/].
     #[arg(long = "model", value_name = "FILE")]
     models: Vec<String>,
+    /// A driving policy from outside, the method "policy": an .onnx file, or the command of a
+    /// program (see docs/policies.md).
+    #[arg(long, value_name = "FILE|COMMAND")]
+    policy: Option<String>,
+    /// Seconds that the program of --policy may take for an answer.
+    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, requires = "policy", value_parser = cli::seconds)]
+    policy_limit: f64,
     /// Write the path to this JSON file.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -95,12 +103,15 @@ fn plan(args: &Args) -> Result<ExitCode> {
 
 /// The method and its models: as told, or the best that fits the scene.
 fn choose(args: &Args, scene: &Scene, problem: &Problem) -> Result<(Method, Models)> {
-    let method = args.method.unwrap_or(Method::N3p);
+    let policy = args.policy.as_deref().map(|p| PolicySource::new(p, args.policy_limit));
+    let policy = policy.transpose().or_bad_input()?;
+    let other = if policy.is_some() { Method::Policy } else { Method::N3p };
+    let method = args.method.unwrap_or(other);
     let models = match &args.models[..] {
         [] => Models::usual(method),
         given => Models::load(given),
     };
-    let models = models.or_bad_input()?;
+    let models = models.or_bad_input()?.with_policy(policy);
     let fits = || -> Result<()> {
         method.build(&models, &MethodSettings::default()).or_bad_input()?;
         models.check_vehicle(&scene.name, &scene.vehicle).or_bad_input()?;

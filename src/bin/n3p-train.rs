@@ -189,7 +189,7 @@ fn rl(args: &RlArgs) -> anyhow::Result<ExitCode> {
     let begin = if args.resume { Begin::Resume } else { Begin::Anew };
     let log = training::rl::train(args.course, &config, &out, begin, &device)
         .map_err(|e| if e.is_bad_input() { BadInput(e.to_string()).into() } else { anyhow::Error::from(e) })?;
-    let best = &log.points[log.best];
+    let best = log.best();
     let problems = Stratum::COUNT * config.validation_count;
     cli::print(format!(
         "{}: the best of {} points is that of {} episodes, which parks in {} of {problems} \
@@ -197,7 +197,7 @@ fn rl(args: &RlArgs) -> anyhow::Result<ExitCode> {
         out.display(),
         log.points.len(),
         best.episodes,
-        best.validated(),
+        best.validated().total(),
         log.points.last().map_or(0, |p| p.steps),
         log.points.last().map_or(0, |p| p.updates),
     ))?;

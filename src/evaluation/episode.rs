@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::export::PathFile;
 use super::oracle;
 use super::rows::Row;
-use crate::planners::{Budget, PlanResult, Planner, Problem, ProblemError, Route};
+use crate::planners::{Budget, PARKED_COVER, PlanResult, Planner, Problem, ProblemError, Route};
 use crate::world::{Level, ParkingType, Scene};
 
 /// A scene to evaluate, and how it is labelled.
@@ -145,7 +145,11 @@ fn describe(
     row.max_abs_steer_rad = Some(vehicle.steer(path.max_abs_curvature()));
     row.mean_abs_steer_change_rad = Some(path.mean_abs_steer_change(vehicle));
     let file = PathFile::new(&case.scene, &problem.frame, path, &row.method);
-    match oracle::check(&case.scene, &file) {
+    let checked = match result.covered {
+        None => oracle::check(&case.scene, &file),
+        Some(_) => oracle::check_cover(&case.scene, &file, PARKED_COVER),
+    };
+    match checked {
         Ok(clearance) => {
             row.ok = true;
             row.min_clearance_m = Some(clearance).filter(|c| c.is_finite());

@@ -10,6 +10,9 @@ use crate::planners::{
     HybridAStar, HybridAStarConfig, MultiHeuristicHybridAStar, PlainHybridAStar, Planner,
     ScenarioHybridAStar,
 };
+use crate::rl::actor::ActorPolicy;
+use crate::rl::courses::Course;
+use crate::rl::rollout::{PolicyPlanner, RolloutConfig};
 use crate::selectors::guided::{GuidedPlanner, RankedConfig};
 use crate::world::UnknownName;
 
@@ -27,14 +30,16 @@ pub enum Method {
     Mhha,
     /// Hybrid A* to the end of a geometric exit manoeuvre (parallel only).
     Sha,
-    /// A policy trained from nothing.
+    /// A policy that learnt in abstracted environments.
     RlSimple,
-    /// The pretrained policy of the paper's baseline (HOPE).
+    /// A policy that learnt in generated scenes.
     RlEval,
     /// The paper's N3P with a pose from the MLP.
     MlpN3p,
     /// The paper's N3P with a pose from KNN.
     KnnN3p,
+    /// A policy from outside.
+    Policy,
     /// Our N3P: ranked candidates, no search where Reeds-Shepp curves suffice.
     N3p,
 }
@@ -55,12 +60,25 @@ pub enum MethodError {
         /// A file name to try.
         example: &'static str,
     },
-    /// It is planned, not written.
-    #[error("method {0} is not available in this version; available: {AVAILABLE}")]
-    NotAvailable(Method),
+    /// It needs a trained policy that was not given.
+    #[error(
+        "method rl-{course} needs a trained policy: give --model FILE (such as --model \
+         rl-{course}.safetensors), or train one with `n3p-train rl --env {course}`"
+    )]
+    NoTrainedPolicy {
+        /// Where the policy should have learnt.
+        course: &'static str,
+    },
+    /// It needs a policy from outside that was not given.
+    #[error(
+        "method policy needs your policy: give --policy FILE.onnx, or --policy \"COMMAND\" of a \
+         program (see docs/policies.md)"
+    )]
+    NoPolicy,
+    /// A policy from outside cannot be started.
+    #[error("--policy: {0}")]
+    Policy(String),
 }
-
-const AVAILABLE: &str = "ha, ha-rs, ha-hold, mhha, sha, mlp-n3p, knn-n3p, n3p";
 
 /// How many solutions the paper's HA* Hold compares.
 const HOLD_SOLUTIONS: usize = 5;
@@ -72,11 +90,13 @@ pub struct MethodSettings {
     pub planner: HybridAStarConfig,
     /// Of the method `n3p`.
     pub n3p: RankedConfig,
+    /// Of every policy.
+    pub rl: RolloutConfig,
 }
 
 impl Method {
     /// All methods, in the order of the paper's tables, ours last.
-    pub const ALL: [Method; 10] = [
+    pub const ALL: [Method; 11] = [
         Self::Ha,
         Self::HaRs,
         Self::HaHold,
@@ -86,6 +106,7 @@ impl Method {
         Self::RlEval,
         Self::MlpN3p,
         Self::KnnN3p,
+        Self::Policy,
         Self::N3p,
     ];
 
@@ -101,6 +122,7 @@ impl Method {
             Self::RlEval => "rl-eval",
             Self::MlpN3p => "mlp-n3p",
             Self::KnnN3p => "knn-n3p",
+            Self::Policy => "policy",
             Self::N3p => "n3p",
         }
     }
@@ -117,7 +139,7 @@ impl Method {
             Self::RlEval => Some("RL Eval"),
             Self::MlpN3p => Some("MLP-N3P"),
             Self::KnnN3p => Some("KNN-N3P"),
-            Self::N3p => None,
+            Self::Policy | Self::N3p => None,
         }
     }
 
@@ -128,7 +150,21 @@ impl Method {
 
     /// Whether it needs a trained model, which is bound to one vehicle.
     pub fn needs_model(self) -> bool {
+        self.needs_selector() || self.course().is_some()
+    }
+
+    /// Whether it needs a selector of preparatory poses, trained from a data set.
+    pub fn needs_selector(self) -> bool {
         matches!(self, Self::MlpN3p | Self::KnnN3p | Self::N3p)
+    }
+
+    /// Where its policy learns, for the methods of reinforcement learning.
+    pub fn course(self) -> Option<Course> {
+        match self {
+            Self::RlSimple => Some(Course::Simple),
+            Self::RlEval => Some(Course::Eval),
+            _ => None,
+        }
     }
 
     /// Every method that can be built from `models`.
@@ -143,7 +179,7 @@ impl Method {
         models: &Models,
         settings: &MethodSettings,
     ) -> Result<Box<dyn Planner + Send>, MethodError> {
-        let MethodSettings { planner: config, n3p } = settings;
+        let MethodSettings { planner: config, n3p, rl } = settings;
         let no_model = |model, example| MethodError::NoModel { method: self, model, example };
         let selector = models.selector(self);
         match self {
@@ -164,7 +200,18 @@ impl Method {
                 let selector = selector.ok_or_else(|| no_model("knn", "knn.bin"))?;
                 Ok(Box::new(GuidedPlanner::ranked(self.name(), selector, *config, *n3p)))
             }
-            Self::RlSimple | Self::RlEval => Err(MethodError::NotAvailable(self)),
+            Self::RlSimple | Self::RlEval => {
+                let course = if self == Self::RlSimple { Course::Simple } else { Course::Eval };
+                let actor = models.actor(course);
+                let actor = actor.ok_or(MethodError::NoTrainedPolicy { course: course.name() })?;
+                let policy = ActorPolicy::new(actor.clone(), rl.choice);
+                Ok(Box::new(PolicyPlanner::new(self.name(), policy, *rl, *config)))
+            }
+            Self::Policy => {
+                let source = models.outside_policy().ok_or(MethodError::NoPolicy)?;
+                let policy = source.open().map_err(|e| MethodError::Policy(e.to_string()))?;
+                Ok(Box::new(PolicyPlanner::new(self.name(), policy, *rl, *config)))
+            }
         }
     }
 }
@@ -176,7 +223,8 @@ impl FromStr for Method {
         Self::ALL.into_iter().find(|m| m.name() == name).ok_or_else(|| UnknownName {
             what: "method",
             name: name.to_owned(),
-            expected: "ha, ha-rs, ha-hold, mhha, sha, rl-simple, rl-eval, mlp-n3p, knn-n3p, n3p",
+            expected: "ha, ha-rs, ha-hold, mhha, sha, rl-simple, rl-eval, mlp-n3p, knn-n3p, \
+                       policy, n3p",
         })
     }
 }
@@ -220,9 +268,11 @@ mod tests {
         let message = build(Method::N3p).err().unwrap().to_string();
         assert!(message.contains("--model") && message.contains("n3p-train knn"), "{message}");
         let message = build(Method::RlEval).err().unwrap().to_string();
-        assert!(message.contains("not available in this version"), "{message}");
+        assert!(message.contains("n3p-train rl --env eval"), "{message}");
+        let message = build(Method::Policy).err().unwrap().to_string();
+        assert!(message.contains("--policy FILE.onnx"), "{message}");
         let available = Method::available(&Models::default());
         assert_eq!(available, Method::ALL[..5]);
-        assert!(available.iter().all(|m| m.is_graph_search() && AVAILABLE.contains(m.name())));
+        assert!(available.iter().all(|m| m.is_graph_search()));
     }
 }

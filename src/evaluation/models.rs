@@ -1,20 +1,28 @@
 //! The trained models of one run, whichever files they come from.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::method::Method;
+use crate::rl::actor::Actor;
+use crate::rl::courses::Course;
+use crate::rl::policy_file;
+use crate::rl::source::PolicySource;
 use crate::selectors::PoseSelector;
-use crate::selectors::artefact::{self, ArtefactError, Model, find_model};
+use crate::selectors::artefact::{self, ArtefactError, Fault, Model, find_model};
 use crate::selectors::mlp::MlpSelector;
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
 
-/// At most one KNN and one MLP selector, all trained for one vehicle.
+/// At most one KNN and one MLP selector and one policy of each course, all trained for one
+/// vehicle; and a policy from outside.
 #[derive(Clone, Default)]
 pub struct Models {
     knn: Option<Arc<dyn PoseSelector>>,
     mlp: Option<Arc<dyn PoseSelector>>,
+    actors: BTreeMap<Course, Actor>,
+    outside: Option<PolicySource>,
     origin: Option<Origin>,
 }
 
@@ -22,8 +30,7 @@ pub struct Models {
 #[derive(Clone, Debug)]
 struct Origin {
     path: PathBuf,
-    family: &'static str,
-    kinds: Vec<ParkingType>,
+    training: String,
     vehicle: Vehicle,
 }
 
@@ -36,6 +43,14 @@ pub enum ModelsError {
     /// Two KNN files were given.
     #[error("--model {0}: a KNN model was given before; one file holds all types: give one")]
     TwoKnn(PathBuf),
+    /// Two policies of one course were given.
+    #[error("--model {path}: a policy of rl-{course} was given before; give one")]
+    TwoPolicies {
+        /// The second file.
+        path: PathBuf,
+        /// Where both learnt.
+        course: &'static str,
+    },
     /// The scene's vehicle is not the one trained for.
     #[error("scene {scene}: vehicle: {error}; or plan with ha-rs")]
     Vehicle {
@@ -66,11 +81,15 @@ impl Models {
         let mut models = Self::default();
         let mut networks: Option<MlpSelector> = None;
         for name in names {
-            let model = Model::load(&find_model(name))?;
-            match &models.origin {
-                Some(first) => model.check_vehicle(&first.vehicle)?,
-                None => models.origin = Some(Origin::of(&model)),
-            }
+            let path = find_model(name);
+            let model = match Model::load(&path) {
+                Err(ArtefactError { fault: Fault::Policy, .. }) => {
+                    models.add_policy(path)?;
+                    continue;
+                }
+                model => model?,
+            };
+            models.add_origin(Origin::of(&model))?;
             match model {
                 Model::Knn(knn) if models.knn.is_some() => {
                     return Err(ModelsError::TwoKnn(knn.path().to_owned()));
@@ -88,6 +107,43 @@ impl Models {
         Ok(models)
     }
 
+    fn add_policy(&mut self, path: PathBuf) -> Result<(), ModelsError> {
+        let (header, actor) = policy_file::load(&path)?;
+        let course = header.course;
+        if self.actors.insert(course, actor).is_some() {
+            return Err(ModelsError::TwoPolicies { path, course: course.name() });
+        }
+        let training = artefact::policy_training(course.name());
+        self.add_origin(Origin { path, training, vehicle: header.vehicle })
+    }
+
+    /// The first one's vehicle is everyone's.
+    fn add_origin(&mut self, new: Origin) -> Result<(), ModelsError> {
+        match &self.origin {
+            Some(first) => {
+                let Origin { path, training, vehicle } = &new;
+                artefact::check_vehicle(path, training, vehicle, &first.vehicle)?;
+            }
+            None => self.origin = Some(new),
+        }
+        Ok(())
+    }
+
+    /// The same with a policy from outside.
+    pub fn with_policy(self, outside: Option<PolicySource>) -> Self {
+        Self { outside, ..self }
+    }
+
+    /// The trained policy of a course, if any.
+    pub fn actor(&self, course: Course) -> Option<&Actor> {
+        self.actors.get(&course)
+    }
+
+    /// The policy from outside, if any.
+    pub fn outside_policy(&self) -> Option<&PolicySource> {
+        self.outside.as_ref()
+    }
+
     /// Loads what `method` needs from the usual files (`knn.bin`, `mlp-TYPE.safetensors`),
     /// as far as they exist.
     pub fn usual(method: Method) -> Result<Self, ModelsError> {
@@ -96,7 +152,7 @@ impl Models {
             Method::MlpN3p => {
                 ParkingType::ALL.iter().map(|k| format!("mlp-{k}.safetensors")).collect()
             }
-            _ => Vec::new(),
+            _ => method.course().map(policy_file::usual_name).into_iter().collect(),
         };
         let found: Vec<PathBuf> =
             names.iter().map(find_model).filter(|path| path.exists()).collect();
@@ -130,10 +186,10 @@ impl Models {
 
     /// Refuses a scene with another vehicle than the models'.
     pub fn check_vehicle(&self, scene: &str, vehicle: &Vehicle) -> Result<(), ModelsError> {
-        let Some(Origin { path, family, kinds, vehicle: trained }) = &self.origin else {
+        let Some(Origin { path, training, vehicle: trained }) = &self.origin else {
             return Ok(());
         };
-        artefact::check_vehicle(path, family, kinds, trained, vehicle)
+        artefact::check_vehicle(path, training, trained, vehicle)
             .map_err(|error| ModelsError::Vehicle { scene: scene.to_owned(), error })
     }
 
@@ -151,15 +207,7 @@ impl Models {
 
 impl Origin {
     fn of(model: &Model) -> Self {
-        let family = match model {
-            Model::Knn(_) => "knn",
-            Model::Mlp(_) => "mlp",
-        };
-        Self {
-            path: model.path().to_owned(),
-            family,
-            kinds: model.kinds(),
-            vehicle: *model.vehicle(),
-        }
+        let (path, vehicle) = (model.path().to_owned(), *model.vehicle());
+        Self { path, training: model.training(), vehicle }
     }
 }

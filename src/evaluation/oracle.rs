@@ -14,6 +14,7 @@ use std::f64::consts::TAU;
 use parry2d_f64::math::{Pose2, Vector2};
 use parry2d_f64::query::{self, PointQuery};
 use parry2d_f64::shape::{Cuboid, Segment};
+use parry2d_f64::transformation::convex_polygons_intersection_points;
 use parry2d_f64::utils::point_in_poly2d;
 
 use super::export::PathFile;
@@ -69,6 +70,14 @@ pub enum Violation {
         mm: f64,
         /// Difference of heading, radians.
         rad: f64,
+    },
+    /// The car covers less of its parked footprint at the end than it should.
+    #[error("ends where {covered:.4} of the parked footprint is covered, expected {share:.4}")]
+    Cover {
+        /// Share covered.
+        covered: f64,
+        /// Share wanted.
+        share: f64,
     },
     /// Two successive poses are too far apart.
     #[error("pose {pose}: the next one is {metres:.3} m away")]
@@ -129,7 +138,13 @@ pub enum Violation {
 /// Checks a path file against its scene. Returns the smallest distance between footprint
 /// and obstacles, metres (infinite without obstacles, 0 on contact).
 pub fn check(scene: &Scene, path: &PathFile) -> Result<f64, Violation> {
-    Oracle::new(scene).check(path)
+    Oracle::new(scene).check(path, None)
+}
+
+/// [`check`] for a path that need not end at the goal, but where at least `share` of the parked
+/// footprint is covered.
+pub fn check_cover(scene: &Scene, path: &PathFile, share: f64) -> Result<f64, Violation> {
+    Oracle::new(scene).check(path, Some(share))
 }
 
 /// A rear-axle pose in local coordinates.
@@ -221,6 +236,20 @@ impl Body {
         self.pose.translation
     }
 
+    /// Share of the footprint that `other`, of the same vehicle, covers.
+    fn covered_by(&self, other: &Body) -> f64 {
+        let corners = |body: &Body| {
+            let Vector2 { x, y } = body.half;
+            let signs = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+            signs.map(|(i, j)| body.pose * Vector2::new(i * x, j * y))
+        };
+        let mut common = Vec::new();
+        convex_polygons_intersection_points(&corners(self), &corners(other), &mut common);
+        let next = common.iter().cycle().skip(1);
+        let twice: f64 = common.iter().zip(next).map(|(a, b)| a.perp_dot(*b)).sum();
+        twice.abs() / 2.0 / (4.0 * self.half.x * self.half.y)
+    }
+
     /// The rectangle, smaller by `margin` metres on every side.
     fn shrunk(&self, margin: f64) -> Cuboid {
         Cuboid::new((self.half - Vector2::splat(margin)).max(Vector2::splat(1e-9)))
@@ -295,7 +324,7 @@ impl Oracle {
         }
     }
 
-    fn check(&self, path: &PathFile) -> Result<f64, Violation> {
+    fn check(&self, path: &PathFile, share: Option<f64>) -> Result<f64, Violation> {
         let n = path.poses.len();
         if n == 0 || path.gears.len() != n || path.steer.len() != n {
             return Err(Violation::Shape {
@@ -318,10 +347,7 @@ impl Oracle {
         if metres > END_TOL || rad > END_TOL {
             return Err(Violation::Start { mm: metres * 1e3, rad });
         }
-        let (metres, rad) = state(n - 1).apart(self.goal);
-        if metres > END_TOL || rad > END_TOL {
-            return Err(Violation::Goal { mm: metres * 1e3, rad });
-        }
+        self.end(state(n - 1), share)?;
         let mut clearance = f64::INFINITY;
         for i in 0..n - 1 {
             let (curvature, s) =
@@ -334,6 +360,18 @@ impl Oracle {
         }
         self.footprint(n - 1, state(n - 1), &mut clearance)?;
         Ok(clearance)
+    }
+
+    /// Whether `end` is the goal, or covers a `share` of the parked footprint.
+    fn end(&self, end: State, share: Option<f64>) -> Result<(), Violation> {
+        let Some(share) = share else {
+            let (metres, rad) = end.apart(self.goal);
+            let at_goal = metres <= END_TOL && rad <= END_TOL;
+            return at_goal.then_some(()).ok_or(Violation::Goal { mm: metres * 1e3, rad });
+        };
+        let body = |state| Body::new(&self.vehicle, state);
+        let covered = body(self.goal).covered_by(&body(end));
+        if covered >= share - 1e-9 { Ok(()) } else { Err(Violation::Cover { covered, share }) }
     }
 
     /// Curvature and signed length of the motion from `from` to `to`, or what is wrong

@@ -9,8 +9,11 @@ use crate::evaluation::suite::MAX_COUNT;
 use crate::evaluation::{Method, MethodSettings, SuiteConfig};
 use crate::files::{TomlError, read_toml};
 use crate::planners::HybridAStarConfig;
+use crate::rl::courses::Course;
+use crate::rl::rollout::RolloutConfig;
 use crate::selectors::guided::RankedConfig;
 use crate::training::MlpConfig;
+use crate::training::rl::RlConfig;
 use crate::vehicle::Vehicle;
 use crate::world::{Level, ParkingType};
 
@@ -52,6 +55,8 @@ pub struct ExperimentConfig {
 pub struct TrainConfig {
     /// The networks, as in `n3p-train mlp --config`, without `seed`.
     pub mlp: MlpConfig,
+    /// The policies, as in `n3p-train rl --config`, without `seed` and `vehicle`.
+    pub rl: RlConfig,
 }
 
 /// Models from parts of the data set, planning in scenes that nothing else uses.
@@ -76,8 +81,8 @@ impl LearningCurveConfig {
 
     fn validate(&self, reported_seed: u64) -> Result<(), String> {
         distinct("methods", &self.methods, |m| m.name())?;
-        if let Some(other) = self.methods.iter().find(|m| !m.needs_model()) {
-            return Err(format!("methods names {other}, which learns nothing; leave it out"));
+        if let Some(other) = self.methods.iter().find(|m| !m.needs_selector()) {
+            return Err(format!("methods names {other}, which learns nothing of data; leave it out"));
         }
         if !(1..=MAX_COUNT).contains(&self.count) {
             return Err(format!("count is {}; expected 1 to {MAX_COUNT}", self.count));
@@ -121,6 +126,9 @@ pub struct EvaluateConfig {
     /// Settings of the method `n3p`.
     #[serde(default)]
     pub n3p: RankedConfig,
+    /// How policies are driven.
+    #[serde(default)]
+    pub rl: RolloutConfig,
 }
 
 impl EvaluateConfig {
@@ -128,7 +136,7 @@ impl EvaluateConfig {
     pub(super) fn suite(&self, methods: &[Method]) -> SuiteConfig {
         SuiteConfig {
             methods: methods.to_vec(),
-            settings: MethodSettings { planner: self.planner, n3p: self.n3p },
+            settings: MethodSettings { planner: self.planner, n3p: self.n3p, rl: self.rl },
             max_expansions: self.max_expansions,
             threads: 1,
         }
@@ -183,6 +191,8 @@ impl ExperimentConfig {
         self.collect.vehicle = self.vehicle;
         self.collect.seed = self.seed;
         self.train.mlp.seed = self.seed;
+        self.train.rl.seed = self.seed;
+        self.train.rl.vehicle = self.vehicle;
         self
     }
 
@@ -200,9 +210,16 @@ impl ExperimentConfig {
         self.vehicle.validate().map_err(|e| e.to_string())?;
         self.collect.validate().map_err(|e| format!("collect: {e}"))?;
         self.train.mlp.validate().map_err(|e| format!("train.mlp: {e}"))?;
+        self.train.rl.validate().map_err(|e| format!("train.rl: {e}"))?;
         let e = &self.evaluate;
+        if e.methods.contains(&Method::Policy) {
+            return Err("evaluate.methods names policy, which only n3p-eval and n3p-plan know; \
+                        leave it out"
+                .to_owned());
+        }
         e.planner.validate().map_err(|m| format!("evaluate.planner.{m}"))?;
         e.n3p.validate().map_err(|m| format!("evaluate.n3p.{m}"))?;
+        e.rl.validate().map_err(|m| format!("evaluate.rl.{m}"))?;
         if let Some(curve) = &self.learning_curve {
             curve.validate(e.seed).map_err(|m| format!("learning_curve.{m}"))?;
         }
@@ -227,7 +244,12 @@ impl ExperimentConfig {
 
     /// Whether some method of the evaluation needs a model.
     pub fn plans_with_models(&self) -> bool {
-        self.evaluate.methods.iter().any(|m| m.needs_model())
+        self.evaluate.methods.iter().any(|m| m.needs_selector())
+    }
+
+    /// Where policies learn for the evaluation.
+    pub fn courses(&self) -> impl Iterator<Item = Course> {
+        self.evaluate.methods.iter().filter_map(|m| m.course())
     }
 
     /// Whether some method needs the networks.
@@ -248,7 +270,9 @@ fn misplaced(written: &toml::Table) -> Option<&'static str> {
         let first = parts.next().and_then(|p| written.get(p));
         parts.try_fold(first?, |table, part| table.get(part))
     };
-    ["collect.seed", "collect.vehicle", "train.mlp.seed"].into_iter().find(|p| has(p).is_some())
+    let misplaced =
+        ["collect.seed", "collect.vehicle", "train.mlp.seed", "train.rl.seed", "train.rl.vehicle"];
+    misplaced.into_iter().find(|p| has(p).is_some())
 }
 
 fn distinct<T: PartialEq>(

@@ -16,6 +16,8 @@ pub struct Given {
     /// Folder of the models, with the names that an experiment gives them. Nothing is collected
     /// or trained; of the learning curve, the results' folder may hold the points already.
     pub models: Option<PathBuf>,
+    /// Folder of the policies, where only these are not to be trained.
+    pub policies: Option<PathBuf>,
 }
 
 impl Given {
@@ -25,8 +27,12 @@ impl Given {
         if self.data.is_some() && !config.learns() {
             return useless("--data");
         }
-        if self.models.is_some() && !config.plans_with_models() {
+        let has_policies = config.courses().next().is_some();
+        if self.models.is_some() && !config.plans_with_models() && !has_policies {
             return useless("--models");
+        }
+        if self.policies.is_some() && !has_policies {
+            return useless("--policies");
         }
         Ok(())
     }

@@ -6,7 +6,7 @@
 //! |---|---|
 //! | `config.toml`, `run.json` | every setting spelt out; the build; written first |
 //! | `dataset/` | the samples |
-//! | `models/` | `knn.bin`, `mlp-TYPE.safetensors`, their cards and logs |
+//! | `models/` | `knn.bin`, `mlp-TYPE.safetensors`, `rl-COURSE.safetensors`, their cards and logs |
 //! | `learning-curve.json`, `learning-curve/` | points of the curve, where one is asked for; those and the models of each part |
 //! | `rows.csv`, `rows.parquet`, `report.md`, `report.html` | the evaluation |
 //! | `traces.jsonl` | its paths, for the report |
@@ -17,6 +17,8 @@
 //! the build changed: then it begins anew.
 
 use std::path::{Path, PathBuf};
+
+use candle_core::Device;
 
 use super::config::ExperimentConfig;
 use super::given::{self, Given};
@@ -33,6 +35,8 @@ use crate::evaluation::{
 use crate::files::{reason, remove_leftovers, write_whole};
 use crate::progress;
 use crate::selectors::artefact::ArtefactError;
+use crate::rl::policy_file;
+use crate::training::rl::{Begin, checkpoint_path};
 use crate::training::{self, TrainingError};
 use crate::world::ParkingType;
 
@@ -101,7 +105,7 @@ pub enum ExperimentError {
         error: Box<ExperimentError>,
     },
     /// The models given cannot be used.
-    #[error("--models: {0}")]
+    #[error("--models or --policies: {0}")]
     GivenModels(ArtefactError),
     /// The worker threads could not be started.
     #[error("collect: {0}")]
@@ -157,18 +161,27 @@ pub fn run(
         return runner.evaluate(ready, &settings(("models", trained)), &runner.known_curve());
     }
     let data = given.data.as_ref().map(|folder| given::data(config, folder)).transpose()?;
-    runner.prepare(None)?;
-    if !config.learns() {
-        return runner.evaluate(runner.ready()?, "", &[]);
+    let policies = given.policies.is_some().then(|| runner.policy_files());
+    if let Some(files) = &policies {
+        Models::load(files).map_err(|error| runner.model_error(error))?;
     }
-    let data = match data {
-        Some(data) => data,
-        None => runner.collect()?,
-    };
-    let mut read = None;
-    runner.train(&data, &mut read)?;
-    let curve = runner.learning_curve(&data, &mut read)?;
-    runner.evaluate(runner.ready()?, &settings((&data, &config.train)), &curve)
+    let policies = policies.map(|files| given::checksums(&files)).transpose()?;
+    runner.prepare(policies.as_deref())?;
+    let (mut data_id, mut curve) = (String::new(), Vec::new());
+    if config.learns() {
+        data_id = match data {
+            Some(data) => data,
+            None => runner.collect()?,
+        };
+        let mut read = None;
+        runner.train(&data_id, &mut read)?;
+        curve = runner.learning_curve(&data_id, &mut read)?;
+    }
+    if policies.is_none() {
+        runner.train_policies()?;
+    }
+    let trained = settings((&data_id, &config.train, &policies));
+    runner.evaluate(runner.ready()?, &trained, &curve)
 }
 
 /// The differences between the rows of two runs, times aside; one line each.
@@ -217,6 +230,7 @@ impl Runner<'_> {
             "scene_seed": self.config.evaluate.seed,
             "data": self.given.data,
             "models": self.given.models,
+            "policies": self.given.policies,
             "models_sha256": models,
         });
         self.write("run.json", format!("{run:#}\n"))
@@ -298,6 +312,26 @@ impl Runner<'_> {
         Ok(())
     }
 
+    /// Trains the policies of the evaluation.
+    fn train_policies(&self) -> Result<(), ExperimentError> {
+        for course in self.config.courses() {
+            self.make_folder(self.path("models"))?;
+            let stage = format!("train-rl-{}", course.name());
+            let (out, config) = (self.model(&policy_file::usual_name(course)), &self.config.train.rl);
+            let rl_settings = settings((&stage, config));
+            match self.stages.begin(&stage, &rl_settings, out.exists())? {
+                Todo::Nothing => continue,
+                Todo::GoOn => {}
+                Todo::BeginAnew => remove(&checkpoint_path(&out))?,
+            }
+            let log = training::rl::train(course, config, &out, Begin::Resume, &Device::Cpu)?;
+            tracing::info!("{stage}: the best policy is that of {} episodes", log.best().episodes);
+            remove(&checkpoint_path(&out))?;
+            self.stages.finish(&stage, &rl_settings)?;
+        }
+        Ok(())
+    }
+
     /// The points of the learning curve, if the experiment wants one.
     fn learning_curve(
         &self,
@@ -364,18 +398,36 @@ impl Runner<'_> {
             let network = |kind| folder.join(format!("mlp-{kind}.safetensors"));
             files.extend(self.config.evaluate.types.iter().map(network));
         }
+        files.extend(self.policy_files());
         files
+    }
+
+    /// The files of the policies that the evaluation needs.
+    fn policy_files(&self) -> Vec<PathBuf> {
+        let made = self.path("models");
+        let Given { policies, models, .. } = self.given;
+        let folder = policies.as_ref().or(models.as_ref()).unwrap_or(&made);
+        self.config.courses().map(|c| folder.join(policy_file::usual_name(c))).collect()
+    }
+
+    /// Says that what cannot be loaded was given, if it was.
+    fn model_error(&self, error: ModelsError) -> ExperimentError {
+        match error {
+            ModelsError::Load(error) if self.given.models.is_some() => {
+                ExperimentError::GivenModels(error)
+            }
+            ModelsError::Load(error) if self.given.policies.is_some() => {
+                ExperimentError::GivenModels(error)
+            }
+            error => error.into(),
+        }
     }
 
     /// Models, scenes and settings of the evaluation, checked.
     fn ready(&self) -> Result<Ready, ExperimentError> {
         let e = &self.config.evaluate;
-        let models = Models::load(&self.model_files()).map_err(|error| match error {
-            ModelsError::Load(error) if self.given.models.is_some() => {
-                ExperimentError::GivenModels(error)
-            }
-            error => error.into(),
-        })?;
+        let models =
+            Models::load(&self.model_files()).map_err(|error| self.model_error(error))?;
         let suite_config = e.suite(&e.methods);
         let vehicle = &self.config.vehicle;
         let cases = suite::generated(vehicle, &e.types, &e.levels, e.count, e.seed)?;

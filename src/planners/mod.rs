@@ -59,8 +59,11 @@ pub struct Budget {
 /// What a planner found, and what it took.
 #[derive(Clone, Debug)]
 pub struct PlanResult {
-    /// The path in the problem's frame, from the start exactly to the goal.
+    /// The path in the problem's frame, from the start to the goal.
     pub outcome: Result<Path, NoPath>,
+    /// Share of the parked footprint that the car covers at the path's end, where the path does
+    /// not lead exactly to the goal; `None` where it does.
+    pub covered: Option<f64>,
     /// Node expansions spent.
     pub expansions: usize,
     /// What N3P took for the spot and did with it; `None` for plain planners.
@@ -71,17 +74,22 @@ impl PlanResult {
     /// A result with `path`, which must pass the exact check from the start to the goal
     /// and keep the steering limit: the certificate every planner's path leaves with.
     pub fn certified(problem: &Problem, path: Path, expansions: usize) -> Self {
-        /// End poses may differ from the goal by accumulated rounding only.
-        const END_TOLERANCE: f64 = 1e-6;
-        /// Stored curvatures are rounded to single precision.
-        const ROUNDING: f64 = 1.0 + 1e-6;
-        let drivable = path.max_abs_curvature() <= problem.vehicle.max_curvature() * ROUNDING;
         let end = path.end();
         let arrives = end.distance(problem.goal) < END_TOLERANCE
-            && signed_angle(end.heading, problem.goal.heading).abs() < END_TOLERANCE
-            && path.start.distance(problem.start) < END_TOLERANCE;
-        if arrives && drivable && problem.collision.path_is_free(&path) {
-            Self { outcome: Ok(path), expansions, guidance: None }
+            && signed_angle(end.heading, problem.goal.heading).abs() < END_TOLERANCE;
+        if arrives && is_drivable(problem, &path) {
+            Self { outcome: Ok(path), covered: None, expansions, guidance: None }
+        } else {
+            Self::none(NoPath::Uncertified, expansions)
+        }
+    }
+
+    /// [`PlanResult::certified`] for a path that ends where the car covers at least
+    /// [`PARKED_COVER`] of its parked footprint, which is parked for methods that drive step by step.
+    pub fn certified_cover(problem: &Problem, path: Path, expansions: usize) -> Self {
+        let covered = problem.vehicle.overlap(path.end(), problem.goal);
+        if covered >= PARKED_COVER && is_drivable(problem, &path) {
+            Self { outcome: Ok(path), covered: Some(covered), expansions, guidance: None }
         } else {
             Self::none(NoPath::Uncertified, expansions)
         }
@@ -89,8 +97,24 @@ impl PlanResult {
 
     /// A result without path.
     pub fn none(reason: NoPath, expansions: usize) -> Self {
-        Self { outcome: Err(reason), expansions, guidance: None }
+        Self { outcome: Err(reason), covered: None, expansions, guidance: None }
     }
+}
+
+/// Share of the parked footprint that must be covered by a car that stops elsewhere than exactly
+/// at the goal (the paper's 90 %).
+pub const PARKED_COVER: f64 = 0.9;
+
+/// Ends of a path may differ from start and goal by accumulated rounding only.
+const END_TOLERANCE: f64 = 1e-6;
+
+/// Whether a path begins at the start, keeps the steering limit and touches nothing.
+fn is_drivable(problem: &Problem, path: &Path) -> bool {
+    /// Stored curvatures are rounded to single precision.
+    const ROUNDING: f64 = 1.0 + 1e-6;
+    path.max_abs_curvature() <= problem.vehicle.max_curvature() * ROUNDING
+        && path.start.distance(problem.start) < END_TOLERANCE
+        && problem.collision.path_is_free(path)
 }
 
 /// Why there is no path.
@@ -105,6 +129,12 @@ pub enum NoPath {
     /// The goal is enclosed: the cost-to-go never reaches the start.
     #[error("goal not reachable from the start")]
     Enclosed,
+    /// The steps of a policy ran out.
+    #[error("not parked within the steps allowed")]
+    OutOfSteps,
+    /// The method itself failed, for a reason of its own.
+    #[error("{0}")]
+    Failed(&'static str),
     /// The method does not apply to this problem.
     #[error("not applicable")]
     NotApplicable,

@@ -69,7 +69,7 @@ impl Course {
 /// the generator would put it.
 fn cell_problem(vehicle: &Vehicle, stratum: Stratum, rng: &mut ChaCha8Rng) -> Problem {
     /// Metres; around the generator's 6 m, less where cars stand across.
-    const LANE_WIDTH: [f64; 2] = [4.5, 7.0];
+    const LANE_WIDTH: [f64; 2] = [5.0, 7.0];
     const DRAWS: usize = 1000;
     let generator = GeneratorConfig::default();
     let sizes = generator.level(stratum.level);

@@ -17,8 +17,10 @@ pub mod network;
 pub mod parking_env;
 pub mod policy_file;
 pub mod replay;
+pub mod rollout;
 pub mod sac;
 mod senses;
+pub mod source;
 
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -72,19 +74,38 @@ pub trait Policy {
     ) -> Result<Action, PolicyFault>;
 }
 
+impl<P: Policy + ?Sized> Policy for Box<P> {
+    fn act(
+        &mut self,
+        observation: &Observation,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<Action, PolicyFault> {
+        (**self).act(observation, rng)
+    }
+}
+
 /// Why a policy gave no action. The scene counts as failed, and the next one begins anew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}", self.reason())]
 pub enum PolicyFault {
     /// Its process ended.
-    #[error("policy: its process ended")]
     Ended,
     /// It took longer than its limit.
-    #[error("policy: no answer within its time limit")]
     TimedOut,
     /// Its answer is not an action.
-    #[error("policy: the answer is no action")]
     NoAction,
     /// Its answer holds NaN or infinity.
-    #[error("policy: the answer is not finite")]
     NotFinite,
+}
+
+impl PolicyFault {
+    /// The reason in rows.
+    pub fn reason(self) -> &'static str {
+        match self {
+            Self::Ended => "policy: its process ended",
+            Self::TimedOut => "policy: no answer within its time limit",
+            Self::NoAction => "policy: the answer is no action",
+            Self::NotFinite => "policy: the answer is not finite",
+        }
+    }
 }

@@ -18,6 +18,11 @@ use crate::selectors::artefact::{self, ArtefactError, Fault};
 use crate::selectors::tensor_file::{self, NamedTensor};
 use crate::vehicle::Vehicle;
 
+/// The file name of a course's policy.
+pub fn usual_name(course: Course) -> String {
+    format!("rl-{}.safetensors", course.name())
+}
+
 /// The format version written and read by this program.
 pub const VERSION: u32 = 1;
 

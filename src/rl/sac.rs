@@ -22,6 +22,9 @@ pub struct SacConfig {
     pub discount: f64,
     /// Share of the way by which targets follow their critics at each update.
     pub follow: f64,
+    /// Share of the way by which the averaged actor follows the actor at each update. It is the
+    /// one that is validated and stored: the actor itself swings.
+    pub average: f64,
     /// Learning rate of actor, critics and temperature.
     pub learning_rate: f64,
     /// Transitions per update.
@@ -37,7 +40,8 @@ impl Default for SacConfig {
         Self {
             discount: 0.98,
             follow: 0.005,
-            learning_rate: 3e-4,
+            average: 0.001,
+            learning_rate: 1e-4,
             batch: 64,
             target_entropy: -(ACTION as f64),
             temperature: 0.01,
@@ -72,6 +76,8 @@ pub struct Sac {
 pub struct Parts {
     /// The actor.
     pub actor: Parameters,
+    /// Its average over the last updates.
+    pub average: Parameters,
     /// The twin critics.
     pub critics: [Parameters; 2],
     /// Their targets.
@@ -85,8 +91,10 @@ impl Sac {
     pub fn new(config: SacConfig, scale: InputScale, seed: u64, device: &Device) -> Result<Self> {
         let critic = |index| Parameters::random(Role::Critic, seed, index, device);
         let critics = [critic(1)?, critic(2)?];
+        let actor = Parameters::random(Role::Actor, seed, 0, device)?;
         let parts = Parts {
-            actor: Parameters::random(Role::Actor, seed, 0, device)?,
+            average: actor.copied()?,
+            actor,
             targets: [critics[0].copied()?, critics[1].copied()?],
             critics,
             log_temperature: Var::new(&[config.temperature.ln() as f32], device)?,
@@ -173,6 +181,7 @@ impl Sac {
         let loss = (log_temperature * excess)?.sum_all()?;
         self.optimisers[2].step(&loss.backward()?, rate)?;
 
+        self.parts.average.follow(&self.parts.actor, self.config.average)?;
         for (target, critic) in self.parts.targets.iter().zip(&self.parts.critics) {
             target.follow(critic, self.config.follow)?;
         }

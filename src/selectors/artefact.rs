@@ -96,7 +96,7 @@ pub enum Fault {
     /// Trained for another car.
     #[error(
         "trained for another vehicle: its {field} is {model}, wanted {wanted}; \
-         collect and train for this vehicle: {command}"
+         train for this vehicle: {command}"
     )]
     OtherVehicle {
         /// Name of the vehicle's field.
@@ -180,13 +180,18 @@ impl Model {
         }
     }
 
-    /// Refuses a model that was trained for another car; see [`check_vehicle`].
-    pub fn check_vehicle(&self, wanted: &Vehicle) -> Result<(), ArtefactError> {
+    /// How to train another one.
+    pub fn training(&self) -> String {
         let name = match self {
             Model::Knn(_) => "knn",
             Model::Mlp(_) => "mlp",
         };
-        check_vehicle(self.path(), name, &self.kinds(), self.vehicle(), wanted)
+        selector_training(name, &self.kinds())
+    }
+
+    /// Refuses a model that was trained for another car; see [`check_vehicle`].
+    pub fn check_vehicle(&self, wanted: &Vehicle) -> Result<(), ArtefactError> {
+        check_vehicle(self.path(), &self.training(), self.vehicle(), wanted)
     }
 
     /// The model as a selector that threads can share.
@@ -200,10 +205,11 @@ impl Model {
 
 /// Compares what decides where a car can drive: dimensions and steering limit. Speeds
 /// only enter times, so a model serves every speed.
+///
+/// `training`: commands that train for the vehicle in FILE.
 pub fn check_vehicle(
     path: &Path,
-    trainer: &str,
-    kinds: &[ParkingType],
+    training: &str,
     model: &Vehicle,
     wanted: &Vehicle,
 ) -> Result<(), ArtefactError> {
@@ -220,18 +226,28 @@ pub fn check_vehicle(
     for (field, model, wanted) in fields {
         let same = (model - wanted).abs() <= TOLERANCE;
         if !same {
-            let kind = match kinds {
-                [kind] => format!(" --type {kind}"),
-                _ => String::new(),
-            };
-            let command = format!(
-                "n3p-collect{kind} --config FILE --out datasets/NAME, with [vehicle] \
-                 {field} = {wanted} in FILE, then n3p-train {trainer}{kind} --data datasets/NAME"
-            );
+            let command = format!("{training}, with [vehicle] {field} = {wanted} in FILE");
             return Err(Fault::OtherVehicle { field, model, wanted, command }.of(path));
         }
     }
     Ok(())
+}
+
+/// How to train a selector of these types.
+pub fn selector_training(trainer: &str, kinds: &[ParkingType]) -> String {
+    let kind = match kinds {
+        [kind] => format!(" --type {kind}"),
+        _ => String::new(),
+    };
+    format!(
+        "n3p-collect{kind} --config FILE --out datasets/NAME, then n3p-train {trainer}{kind} \
+         --data datasets/NAME"
+    )
+}
+
+/// How to train a policy of a course.
+pub fn policy_training(course: &str) -> String {
+    format!("n3p-train rl --env {course} --config FILE --out models/NAME.safetensors")
 }
 
 /// Where the model called `name` lies: a path is taken as it is; a bare name is looked
@@ -274,14 +290,14 @@ mod tests {
     fn another_vehicle_names_field_values_and_command() {
         let model = Vehicle::default();
         let wanted = Vehicle { wheelbase: 2.7, ..model };
-        let kinds = [ParkingType::Parallel];
-        let error = check_vehicle(Path::new("m"), "mlp", &kinds, &model, &wanted).unwrap_err();
+        let training = selector_training("mlp", &[ParkingType::Parallel]);
+        let error = check_vehicle(Path::new("m"), &training, &model, &wanted).unwrap_err();
         let text = error.to_string();
         for part in ["wheelbase is 2.83", "wanted 2.7", "n3p-train mlp --type parallel"] {
             assert!(text.contains(part), "{text}");
         }
         let faster = Vehicle { forward_speed: 3.0, ..model };
-        assert!(check_vehicle(Path::new("m"), "mlp", &kinds, &model, &faster).is_ok());
+        assert!(check_vehicle(Path::new("m"), &training, &model, &faster).is_ok());
     }
 
     #[test]

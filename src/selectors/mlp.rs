@@ -110,8 +110,7 @@ impl MlpSelector {
             let first = &self.networks[0];
             artefact::check_vehicle(
                 &new.path,
-                "mlp",
-                &[new.header.kind],
+                &artefact::selector_training("mlp", &[new.header.kind]),
                 &new.header.vehicle,
                 &first.header.vehicle,
             )?;

@@ -114,7 +114,7 @@ fn family(method: &str) -> &'static str {
     match method.parse::<Method>() {
         Ok(Method::N3p) => "ours",
         Ok(Method::MlpN3p | Method::KnnN3p) => "n3p",
-        Ok(Method::RlSimple | Method::RlEval) => "rl",
+        Ok(Method::RlSimple | Method::RlEval | Method::Policy) => "rl",
         Ok(method) if method.is_graph_search() => "search",
         _ => "other",
     }

@@ -17,7 +17,7 @@ use crate::dataset::Metadata;
 use crate::world::ParkingType;
 use crate::world::cell::Axis;
 
-const VERSION: &str = env!("CARGO_PKG_VERSION");
+pub(super) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// Inputs of every selector.
 const INPUTS: &str = "\
@@ -137,11 +137,11 @@ fn spots(kind: ParkingType) -> &'static str {
     }
 }
 
-fn name(out: &Path) -> String {
+pub(super) fn name(out: &Path) -> String {
     format!("`{}`", out.file_name().unwrap_or_default().to_string_lossy())
 }
 
-fn percent(share: f64) -> String {
+pub(super) fn percent(share: f64) -> String {
     format!("{:.1} %", 100.0 * share)
 }
 

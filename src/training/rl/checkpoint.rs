@@ -94,8 +94,9 @@ impl State {
 }
 
 const OPTIMISERS: [&str; 3] = ["actor", "critics", "temperature"];
-const NETWORKS: [(&str, Role); 5] = [
+const NETWORKS: [(&str, Role); 6] = [
     ("actor", Role::Actor),
+    ("average", Role::Actor),
     ("critic0", Role::Critic),
     ("critic1", Role::Critic),
     ("target0", Role::Critic),
@@ -113,6 +114,7 @@ pub fn write(
     let parts = agent.parts();
     let networks = [
         &parts.actor,
+        &parts.average,
         &parts.critics[0],
         &parts.critics[1],
         &parts.targets[0],
@@ -165,8 +167,9 @@ fn decode(bytes: &[u8], device: &Device) -> Result<(State, Sac, Replay), Fault> 
     let log_temperature = tensor_file::f32s(&tensors, "log_temperature", &[1])?;
     let parts = Parts {
         actor: network(NETWORKS[0])?,
-        critics: [network(NETWORKS[1])?, network(NETWORKS[2])?],
-        targets: [network(NETWORKS[3])?, network(NETWORKS[4])?],
+        average: network(NETWORKS[1])?,
+        critics: [network(NETWORKS[2])?, network(NETWORKS[3])?],
+        targets: [network(NETWORKS[4])?, network(NETWORKS[5])?],
         log_temperature: Var::new(log_temperature.as_slice(), device).map_err(candle)?,
     };
     let mut agent =

@@ -51,7 +51,7 @@ impl Default for RlConfig {
             steps_per_update: 4,
             replay: 100_000,
             report_every: 250,
-            validation_count: 20,
+            validation_count: 40,
             validation_seed: 79,
             vehicle: Vehicle::default(),
             env: EnvConfig::default(),
@@ -105,6 +105,7 @@ impl RlConfig {
         real("env.reward_scale", env.reward_scale, 1e-6..=1e3, "a number from 1e-6 to 1000")?;
         real("sac.discount", sac.discount, 0.0..=1.0, "a number from 0 to 1")?;
         real("sac.follow", sac.follow, 1e-6..=1.0, "a number from 1e-6 to 1")?;
+        real("sac.average", sac.average, 1e-6..=1.0, "a number from 1e-6 to 1")?;
         real("sac.learning_rate", sac.learning_rate, 1e-8..=1.0, "a number from 1e-8 to 1")?;
         whole("sac.batch", sac.batch, 65_536, "a whole number from 1 to 65536")?;
         real("sac.target_entropy", sac.target_entropy, -100.0..=100.0, "a number from -100 to 100")?;

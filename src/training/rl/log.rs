@@ -20,6 +20,13 @@ pub struct RlLog {
     pub best: usize,
 }
 
+impl RlLog {
+    /// The point whose policy is stored. Panics before there is any.
+    pub fn best(&self) -> &Point {
+        &self.points[self.best]
+    }
+}
+
 /// A point of the curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Point {
@@ -37,10 +44,40 @@ pub struct Point {
     pub mean_steps: f64,
     /// The last update.
     pub losses: Losses,
-    /// Validation problems of each stratum parked by drawn actions.
-    pub validation_sampled: [u32; Stratum::COUNT],
-    /// Validation problems of each stratum parked by the mean action within the mask.
-    pub validation_mean: [u32; Stratum::COUNT],
+    /// Validation by drawn actions.
+    pub sampled: Validation,
+    /// Validation by the mean action within the mask.
+    pub mean: Validation,
+}
+
+/// How one way of acting does on the validation problems.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Validation {
+    /// Problems of each stratum that were parked.
+    pub parked: [u32; Stratum::COUNT],
+    /// Mean steps of all of them.
+    pub mean_steps: f64,
+}
+
+impl Validation {
+    /// Problems parked.
+    pub fn total(&self) -> u32 {
+        self.parked.iter().sum()
+    }
+
+    /// Share of a type's problems that were parked, of `count` in each stratum.
+    pub fn share(&self, kind: ParkingType, count: usize) -> f64 {
+        let of_kind = |(i, _): &(usize, &u32)| Stratum::nth(*i).kind == kind;
+        let levels = self.parked.iter().enumerate().filter(of_kind);
+        let (problems, parked) = levels.fold((0, 0), |(n, p), (_, parked)| (n + count, p + parked));
+        f64::from(parked) / problems.max(1) as f64
+    }
+
+    /// Whether it parks more problems, or as many in fewer steps.
+    fn is_better_than(&self, other: &Validation) -> bool {
+        let fewer = self.mean_steps < other.mean_steps;
+        self.total() > other.total() || self.total() == other.total() && fewer
+    }
 }
 
 impl Point {
@@ -50,17 +87,13 @@ impl Point {
         sum(0) / sum(1).max(1.0)
     }
 
-    /// Validation problems parked by whichever way of acting parks more.
-    pub fn validated(&self) -> u32 {
-        let sum = |parked: &[u32]| parked.iter().sum::<u32>();
-        sum(&self.validation_sampled).max(sum(&self.validation_mean))
+    /// Validation by whichever way of acting does better.
+    pub fn validated(&self) -> &Validation {
+        if self.sampled.is_better_than(&self.mean) { &self.sampled } else { &self.mean }
     }
-}
 
-/// Share of a type's validation problems that were parked.
-pub fn share(parked: &[u32; Stratum::COUNT], kind: ParkingType, count: usize) -> f64 {
-    let of_kind = |(i, _): &(usize, &u32)| Stratum::nth(*i).kind == kind;
-    let levels = parked.iter().enumerate().filter(of_kind);
-    let (problems, parked) = levels.fold((0, 0), |(n, p), (_, parked)| (n + count, p + parked));
-    f64::from(parked) / problems.max(1) as f64
+    /// Whether its policy validates better than that of another point.
+    pub fn is_better_than(&self, other: &Point) -> bool {
+        self.validated().is_better_than(other.validated())
+    }
 }

@@ -7,7 +7,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::checkpoint::{self, Slot, State, checkpoint_path};
-use super::log::{Point, RlLog};
+use super::log::{Point, RlLog, Validation};
 use super::strata::Strata;
 use super::{RlConfig, card, curve};
 use crate::progress;
@@ -57,7 +57,8 @@ pub fn train(
         if trainer.is_due() {
             trainer.report(out)?;
             let point = trainer.log.points.last().expect("a report adds a point");
-            let validated = f64::from(point.validated()) / trainer.validation_problems() as f64;
+            let problems = trainer.validation_problems() as f64;
+            let validated = f64::from(point.validated().total()) / problems;
             let line = format!(
                 "{} episodes, {} steps: {:.0} % parked, {:.1} % of the validation problems, \
                  α {:.3}, entropy {:.2}",
@@ -303,7 +304,7 @@ impl Trainer {
     /// Adds a point, stores the policy if it is the best, and leaves a checkpoint.
     fn report(&mut self, out: &Path) -> Result<(), TrainingError> {
         let Some(agent) = &self.agent else { return Err(TrainingError::OnlyWarmUp) };
-        let actor = Actor::new(&agent.parts().actor, agent.scale.clone());
+        let actor = Actor::new(&agent.parts().average, agent.scale.clone());
         let Window { parked, total, steps } = std::mem::take(&mut self.window);
         let finished = f64::from(parked.iter().map(|p| p[1]).sum::<u32>().max(1));
         let point = Point {
@@ -314,15 +315,16 @@ impl Trainer {
             mean_return: total / finished,
             mean_steps: steps as f64 / finished,
             losses: self.losses,
-            validation_sampled: self.validate(&actor, Choice::Sampled)?,
-            validation_mean: self.validate(&actor, Choice::Mean)?,
+            sampled: self.validate(&actor, Choice::Sampled),
+            mean: self.validate(&actor, Choice::Mean),
         };
-        let best = self.log.points.get(self.log.best).map(Point::validated);
-        let is_best = best.is_none_or(|best| point.validated() > best);
+        let best = self.log.points.get(self.log.best);
+        let is_best = best.is_none_or(|best| point.is_better_than(best));
         self.log.points.push(point);
         if is_best {
             self.log.best = self.log.points.len() - 1;
-            artefact::write(out, &policy_file::encode(&self.header(agent), &agent.parts().actor.values()?))?;
+            let weights = agent.parts().average.values()?;
+            artefact::write(out, &policy_file::encode(&self.header(agent), &weights))?;
         }
         write_beside(out, &self.log, card::card(out, &self.log))?;
         self.checkpoint(out)
@@ -364,27 +366,24 @@ impl Trainer {
         checkpoint::write(&checkpoint_path(out), state, agent, &self.replay)
     }
 
-    /// How many validation problems of each stratum are parked.
-    fn validate(
-        &self,
-        actor: &Actor,
-        choice: Choice,
-    ) -> Result<[u32; Stratum::COUNT], TrainingError> {
+    /// Drives the validation problems.
+    fn validate(&self, actor: &Actor, choice: Choice) -> Validation {
         let config = self.config();
-        let mut parked = [0; Stratum::COUNT];
-        for (stratum, parked) in parked.iter_mut().enumerate() {
+        let (mut parked, mut steps) = ([0; Stratum::COUNT], 0);
+        for (s, parked) in parked.iter_mut().enumerate() {
             for i in 0..config.validation_count as u64 {
-                let running = Stratum::nth(stratum);
                 let seed = config.validation_seed;
-                let problem = self.log.course.problem(&config.vehicle, running, seed, i);
+                let stratum = Stratum::nth(s);
+                let problem = self.log.course.problem(&config.vehicle, stratum, seed, i);
                 let mut env = ParkingEnv::new(problem, config.env);
                 let mut policy = ActorPolicy::new(actor.clone(), choice);
-                let index = (stratum as u64) << 32 | i;
-                let end = drive(&mut env, &mut policy, &mut rng(seed, Stream::Policy, index));
-                *parked += u32::from(end == End::Parked);
+                let mut rng = rng(seed, Stream::Policy, (s as u64) << 32 | i);
+                *parked += u32::from(drive(&mut env, &mut policy, &mut rng) == End::Parked);
+                steps += env.progress().step;
             }
         }
-        Ok(parked)
+        let problems = self.validation_problems() as f64;
+        Validation { parked, mean_steps: f64::from(steps) / problems }
     }
 }
 
