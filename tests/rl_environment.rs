@@ -89,7 +89,7 @@ fn parry_touches(problem: &Problem, edges: &[(Vec2, Vec2)], pose: Pose) -> bool 
     let at = Pose2::new(Vector2::new(center.x, center.y), center.heading);
     edges.iter().any(|(a, b)| {
         let edge = Edge::new(Vector2::new(a.x, a.y), Vector2::new(b.x, b.y));
-        intersection_test(&at, &body, &Pose2::IDENTITY, &edge).unwrap()
+        intersection_test(&at, &body, &Pose2::IDENTITY, &edge).unwrap().intersecting
     })
 }
 
