@@ -1,9 +1,14 @@
 //! Reinforcement learning: policies, the environment they park in, and the one trained here.
 //!
-//! A [`Policy`] sees an [`Observation`] and answers with an [`Action`].
+//! A [`Policy`] sees an [`Observation`] and answers with an [`Action`]. Policies from elsewhere are
+//! an ONNX file ([`onnx`]) or any program ([`process`]).
 //!
 //! Source: M. Jiang et al., "HOPE: A Reinforcement Learning-based Hybrid Policy Path Planner for
 //! Diverse Parking Scenarios", which the paper compares with.
+
+pub mod onnx;
+mod onnx_file;
+pub mod process;
 
 use rand_chacha::ChaCha8Rng;
 
