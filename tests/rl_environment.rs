@@ -110,7 +110,10 @@ fn a_random_policy_under_the_mask_never_collides_in_100_000_steps() {
             let entry = rng.random_range(0..MASK);
             let action = admitted(motion::action(entry), &shares);
             let motion = action.motion(&problem.vehicle);
-            assert!(problem.collision.segment_is_free(pose, motion), "{index}: {pose:?} {action:?}");
+            assert!(
+                problem.collision.segment_is_free(pose, motion),
+                "{index}: {pose:?} {action:?}"
+            );
             for part in 1..=4 {
                 let there = motion.at(pose, motion.length * f64::from(part) / 4.0);
                 assert!(!parry_touches(&problem, &edges, there), "{index}: {pose:?} {action:?}");

@@ -133,7 +133,8 @@ fn ninety_per_cent_of_the_spot_is_parked() {
     scene.start.y = goal.y + 1.5 * sin + 0.05 * cos;
     scene.start.heading = goal.heading;
     let config = RolloutConfig { curve_distance: 0.0, ..RolloutConfig::default() };
-    let back = Function(|_: &Observation, _: &mut ChaCha8Rng| Ok(Action { steer: 0.0, speed: -1.0 }));
+    let back =
+        Function(|_: &Observation, _: &mut ChaCha8Rng| Ok(Action { steer: 0.0, speed: -1.0 }));
     let mut planner = PolicyPlanner::new("policy", back, config, HybridAStarConfig::default());
     let problem = Problem::new(&scene).unwrap();
     let result = planner.plan(&problem, BUDGET);

@@ -88,7 +88,10 @@ fn what_would_be_lost_or_mixed_up_is_refused() {
     };
     let policy = fs::read(dir.path().join("p.safetensors")).unwrap();
     let e = refused(&[]);
-    assert!(e.contains("p.checkpoint: a checkpoint is here already") && e.contains("--resume"), "{e}");
+    assert!(
+        e.contains("p.checkpoint: a checkpoint is here already") && e.contains("--resume"),
+        "{e}"
+    );
     let e = refused(&["--resume", "--seed", "5"]);
     assert!(e.contains("other settings"), "{e}");
     let e = refused(&["--resume", "--env", "simple"]);

@@ -187,8 +187,9 @@ fn rl(args: &RlArgs) -> anyhow::Result<ExitCode> {
     artefact::check_writable(&out).or_bad_input()?;
     let device = args.device.open()?;
     let begin = if args.resume { Begin::Resume } else { Begin::Anew };
-    let log = training::rl::train(args.course, &config, &out, begin, &device)
-        .map_err(|e| if e.is_bad_input() { BadInput(e.to_string()).into() } else { anyhow::Error::from(e) })?;
+    let log = training::rl::train(args.course, &config, &out, begin, &device).map_err(|e| {
+        if e.is_bad_input() { BadInput(e.to_string()).into() } else { anyhow::Error::from(e) }
+    })?;
     let best = log.best();
     let problems = Stratum::COUNT * config.validation_count;
     cli::print(format!(

@@ -82,7 +82,9 @@ impl LearningCurveConfig {
     fn validate(&self, reported_seed: u64) -> Result<(), String> {
         distinct("methods", &self.methods, |m| m.name())?;
         if let Some(other) = self.methods.iter().find(|m| !m.needs_selector()) {
-            return Err(format!("methods names {other}, which learns nothing of data; leave it out"));
+            return Err(format!(
+                "methods names {other}, which learns nothing of data; leave it out"
+            ));
         }
         if !(1..=MAX_COUNT).contains(&self.count) {
             return Err(format!("count is {}; expected 1 to {MAX_COUNT}", self.count));

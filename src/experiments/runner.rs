@@ -34,8 +34,8 @@ use crate::evaluation::{
 };
 use crate::files::{reason, remove_leftovers, write_whole};
 use crate::progress;
-use crate::selectors::artefact::ArtefactError;
 use crate::rl::policy_file;
+use crate::selectors::artefact::ArtefactError;
 use crate::training::rl::{Begin, checkpoint_path};
 use crate::training::{self, TrainingError};
 use crate::world::ParkingType;
@@ -317,7 +317,8 @@ impl Runner<'_> {
         for course in self.config.courses() {
             self.make_folder(self.path("models"))?;
             let stage = format!("train-rl-{}", course.name());
-            let (out, config) = (self.model(&policy_file::usual_name(course)), &self.config.train.rl);
+            let (out, config) =
+                (self.model(&policy_file::usual_name(course)), &self.config.train.rl);
             let rl_settings = settings((&stage, config));
             match self.stages.begin(&stage, &rl_settings, out.exists())? {
                 Todo::Nothing => continue,
@@ -426,8 +427,7 @@ impl Runner<'_> {
     /// Models, scenes and settings of the evaluation, checked.
     fn ready(&self) -> Result<Ready, ExperimentError> {
         let e = &self.config.evaluate;
-        let models =
-            Models::load(&self.model_files()).map_err(|error| self.model_error(error))?;
+        let models = Models::load(&self.model_files()).map_err(|error| self.model_error(error))?;
         let suite_config = e.suite(&e.methods);
         let vehicle = &self.config.vehicle;
         let cases = suite::generated(vehicle, &e.types, &e.levels, e.count, e.seed)?;

@@ -32,9 +32,7 @@ impl Actor {
 }
 
 /// How an actor's Gaussian becomes an action.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum Choice {
     /// Drawn, as HOPE does in evaluation too.

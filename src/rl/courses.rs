@@ -80,8 +80,7 @@ fn cell_problem(vehicle: &Vehicle, stratum: Stratum, rng: &mut ChaCha8Rng) -> Pr
     loop {
         let lane_width = between(LANE_WIDTH);
         let kind = stratum.kind;
-        let widths =
-            if kind.is_bay() { sizes.bay_spot_width } else { sizes.parallel_spot_width };
+        let widths = if kind.is_bay() { sizes.bay_spot_width } else { sizes.parallel_spot_width };
         let spot_width = between(widths);
         let closed = between([0.0, 1.0]) < sizes.dead_end_probability;
         let dead_end = if closed { between(sizes.dead_end) } else { grid.dead_end.max };

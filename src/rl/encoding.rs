@@ -37,7 +37,9 @@ impl InputScale {
     pub fn validate(&self) -> std::result::Result<(), String> {
         let (means, deviations) = (self.mean.len(), self.deviation.len());
         if (means, deviations) != (SCALED, SCALED) {
-            return Err(format!("the input scale has {means} and {deviations} values, not {SCALED}"));
+            return Err(format!(
+                "the input scale has {means} and {deviations} values, not {SCALED}"
+            ));
         }
         let fine = self.mean.iter().all(|m| m.is_finite())
             && self.deviation.iter().all(|d| d.is_finite() && *d > 0.0);

@@ -1,6 +1,7 @@
 //! Reinforcement learning: policies, the environment they park in, and the one trained here.
 //!
-//! A [`Policy`] sees an [`Observation`] and answers with an [`Action`].
+//! A [`Policy`] sees an [`Observation`] and answers with an [`Action`]. Policies from elsewhere are
+//! an ONNX file ([`onnx`]) or any program ([`process`]).
 //!
 //! `senses` makes observations with the [`lidar`] and the mask of [`motion`]; [`parking_env`] is what
 //! agents learn in, on problems of [`courses`].
@@ -14,8 +15,11 @@ pub mod encoding;
 pub mod lidar;
 pub mod motion;
 pub mod network;
+pub mod onnx;
+mod onnx_file;
 pub mod parking_env;
 pub mod policy_file;
+pub mod process;
 pub mod replay;
 pub mod rollout;
 pub mod sac;

@@ -164,7 +164,10 @@ mod tests {
                 let pose = Pose::new(1.0, 2.0, 0.4);
                 let end = steps.iter().fold(pose, |p, a| a.motion(&v).end(p));
                 assert!(end.distance(segment.end(pose)) < 1e-8, "{segment:?} {steps:?}");
-                assert_eq!(steps.len() as f64, (length.abs() / full_step(&v, segment.gear()) - 1e-9).ceil().max(0.0));
+                assert_eq!(
+                    steps.len() as f64,
+                    (length.abs() / full_step(&v, segment.gear()) - 1e-9).ceil().max(0.0)
+                );
             }
         }
     }

@@ -124,7 +124,8 @@ impl Parameters {
 
     /// Another set of the same values.
     pub fn copied(&self) -> Result<Self> {
-        let copy = |(name, var): (&String, &Var)| Ok((name.clone(), Var::from_tensor(&var.copy()?)?));
+        let copy =
+            |(name, var): (&String, &Var)| Ok((name.clone(), Var::from_tensor(&var.copy()?)?));
         Ok(Self { role: self.role, vars: self.vars.iter().map(copy).collect::<Result<_>>()? })
     }
 
@@ -135,7 +136,8 @@ impl Parameters {
 
     /// The values, by name.
     pub fn values(&self) -> Result<BTreeMap<String, Vec<f32>>> {
-        let values = |(name, var): (&String, &Var)| Ok((name.clone(), var.flatten_all()?.to_vec1()?));
+        let values =
+            |(name, var): (&String, &Var)| Ok((name.clone(), var.flatten_all()?.to_vec1()?));
         self.vars.iter().map(values).collect()
     }
 

@@ -1,6 +1,6 @@
 //! The parking environment: steps, rewards, and the curve that takes over.
 //!
-//! Differences from HOPE, all said in docs/policies.md: contact is found exactly, the bay's goal
+//! Differences from HOPE, all said in docs/design-notes.md: contact is found exactly, the bay's goal
 //! is the set that every method here has, and time running out is no failure to learn from.
 
 use std::collections::VecDeque;

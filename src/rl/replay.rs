@@ -147,8 +147,14 @@ mod tests {
             let (got, expected) = (memory.get(index), transition(i));
             let apart = (got.before.lidar[0] - expected.before.lidar[0]).abs();
             assert!(apart < 1e-4, "{apart}");
-            assert_eq!((got.before.target, got.after.mask), (expected.before.target, expected.after.mask));
-            assert_eq!((got.action, got.reward, got.goes_on), (expected.action, expected.reward, expected.goes_on));
+            assert_eq!(
+                (got.before.target, got.after.mask),
+                (expected.before.target, expected.after.mask)
+            );
+            assert_eq!(
+                (got.action, got.reward, got.goes_on),
+                (expected.action, expected.reward, expected.goes_on)
+            );
         }
         let (bytes, next) = memory.state();
         let again = Replay::restored(3, bytes.to_vec(), next).unwrap();

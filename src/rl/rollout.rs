@@ -27,11 +27,7 @@ pub struct RolloutConfig {
 
 impl Default for RolloutConfig {
     fn default() -> Self {
-        Self {
-            choice: Choice::default(),
-            horizon: 400,
-            curve_distance: 10.0,
-        }
+        Self { choice: Choice::default(), horizon: 400, curve_distance: 10.0 }
     }
 }
 

@@ -130,7 +130,11 @@ impl Sac {
     }
 
     /// Actions for `observations`, `[batch, 2]`, with this normal noise (none: the mean).
-    pub fn act(&self, observations: &[Observation], noise: Option<&[f32]>) -> Result<Vec<[f32; 2]>> {
+    pub fn act(
+        &self,
+        observations: &[Observation],
+        noise: Option<&[f32]>,
+    ) -> Result<Vec<[f32; 2]>> {
         let inputs = self.scale.inputs(observations.iter(), &self.device)?;
         let output = self.parts.actor.frozen_network().forward(&inputs.each_ref())?;
         squashed(&output, noise, &self.device)?.to_vec2().map(pairs)
@@ -146,8 +150,7 @@ impl Sac {
             Tensor::from_vec(batch.iter().map(value).collect(), (batch.len(), 1), device)
         };
         let rewards = column(&|t| t.reward)?;
-        let discounts =
-            column(&|t| if t.goes_on { self.config.discount as f32 } else { 0.0 })?;
+        let discounts = column(&|t| if t.goes_on { self.config.discount as f32 } else { 0.0 })?;
         let actions = batch.iter().flat_map(|t| [t.action.steer as f32, t.action.speed as f32]);
         let actions = Tensor::from_vec(actions.collect::<Vec<_>>(), (batch.len(), ACTION), device)?;
         let (noise_after, noise_before) = noise.split_at(noise.len() / 2);
@@ -161,7 +164,8 @@ impl Sac {
         let worth = (least(&targets, &after, &next)? - (next_log * f64::from(temperature))?)?;
         let wanted = (rewards + (discounts * worth)?)?.detach();
         let critics = self.parts.critics.each_ref().map(Parameters::network);
-        let errors = critics.iter().map(|c| (value(c, &before, &actions)? - &wanted)?.sqr()?.mean_all());
+        let errors =
+            critics.iter().map(|c| (value(c, &before, &actions)? - &wanted)?.sqr()?.mean_all());
         let errors = errors.collect::<Result<Vec<_>>>()?;
         let critic_loss = (&errors[0] + &errors[1])?;
         let rate = self.config.learning_rate;

@@ -175,7 +175,8 @@ fn decode(bytes: &[u8]) -> Result<(MlpHeader, Vec<LayerWeights>), Fault> {
     if tensor_file::is_policy(&json) {
         return Err(Fault::Policy);
     }
-    let header: MlpHeader = serde_json::from_str(&json).map_err(|e| Fault::Header(e.to_string()))?;
+    let header: MlpHeader =
+        serde_json::from_str(&json).map_err(|e| Fault::Header(e.to_string()))?;
     check_header(&header).map_err(Fault::Header)?;
     let layers = LAYERS.windows(2).enumerate().map(|(n, size)| {
         Ok(LayerWeights {
@@ -204,4 +205,3 @@ fn check_header(header: &MlpHeader) -> Result<(), String> {
     header.input.check(Features::COUNT).map_err(|e| format!("input {e}"))?;
     header.output.check(OUTPUTS).map_err(|e| format!("output {e}"))
 }
-

@@ -66,7 +66,11 @@ struct VersionOnly {
 
 /// The header's text and the tensors of a file, its checksum and version checked. `data_len`:
 /// bytes of tensors that a whole file holds, for the message about one that is cut off.
-pub fn decode(bytes: &[u8], version: u32, data_len: u64) -> Result<(String, SafeTensors<'_>), Fault> {
+pub fn decode(
+    bytes: &[u8],
+    version: u32,
+    data_len: u64,
+) -> Result<(String, SafeTensors<'_>), Fault> {
     let (data_at, entry) = metadata(bytes, data_len)?;
     let versioned: Versioned =
         serde_json::from_str(&entry).map_err(|e| Fault::Header(e.to_string()))?;

@@ -18,12 +18,12 @@ use rand::seq::SliceRandom;
 use serde::{Deserialize, Serialize};
 
 use super::curve::{self, EpochLoss};
-use crate::nn::AdamW;
 use super::quality::{Errors, Reach, errors, reach};
 use super::targets::{self, Example};
 use super::{Loss, MlpConfig, TrainingError, Validation, card, solved, write_beside};
 use crate::dataset::{Metadata, Sample, content_sha256, validation_cells};
 use crate::geometry::Pose;
+use crate::nn::AdamW;
 use crate::progress;
 use crate::rng::{Stream, rng};
 use crate::selectors::artefact;

@@ -17,12 +17,8 @@ impl Vehicle {
 /// The part of a convex polygon inside `bx` (Sutherland & Hodgman 1974).
 fn clip(polygon: Vec<Vec2>, bx: &Aabb) -> Vec<Vec2> {
     // Each side as the signed distance to its inside.
-    let sides: [&dyn Fn(Vec2) -> f64; 4] = [
-        &|p| p.x - bx.min.x,
-        &|p| bx.max.x - p.x,
-        &|p| p.y - bx.min.y,
-        &|p| bx.max.y - p.y,
-    ];
+    let sides: [&dyn Fn(Vec2) -> f64; 4] =
+        [&|p| p.x - bx.min.x, &|p| bx.max.x - p.x, &|p| p.y - bx.min.y, &|p| bx.max.y - p.y];
     sides.iter().fold(polygon, |polygon, inside| {
         let mut kept = Vec::with_capacity(polygon.len() + 1);
         for (i, &b) in polygon.iter().enumerate() {

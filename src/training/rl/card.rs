@@ -22,7 +22,8 @@ pub(super) fn card(out: &Path, log: &RlLog) -> String {
     let mut validation = String::new();
     for kind in ParkingType::ALL {
         let share = |v: &super::log::Validation| percent(v.share(kind, c.validation_count));
-        let _ = writeln!(validation, "| {kind} | {} | {} |", share(&best.sampled), share(&best.mean));
+        let _ =
+            writeln!(validation, "| {kind} | {} | {} |", share(&best.sampled), share(&best.mean));
     }
     let (sampled, mean) = (best.sampled.mean_steps, best.mean.mean_steps);
     let last = log.points.last().expect("a card is written after a point");
@@ -34,7 +35,7 @@ pub(super) fn card(out: &Path, log: &RlLog) -> String {
 
 A policy that parks step by step: it sees distances around the car, where the goal lies and which
 steps are free, and answers with steering and speed. Trained by soft actor-critic after HOPE
-(see docs/policies.md for what it sees and does, and what differs). Written by n3p {VERSION}.
+(docs/policies.md says what it sees and does, docs/design-notes.md what differs). Written by n3p {VERSION}.
 
 ## What it is for
 

@@ -108,7 +108,12 @@ impl RlConfig {
         real("sac.average", sac.average, 1e-6..=1.0, "a number from 1e-6 to 1")?;
         real("sac.learning_rate", sac.learning_rate, 1e-8..=1.0, "a number from 1e-8 to 1")?;
         whole("sac.batch", sac.batch, 65_536, "a whole number from 1 to 65536")?;
-        real("sac.target_entropy", sac.target_entropy, -100.0..=100.0, "a number from -100 to 100")?;
+        real(
+            "sac.target_entropy",
+            sac.target_entropy,
+            -100.0..=100.0,
+            "a number from -100 to 100",
+        )?;
         real("sac.temperature", sac.temperature, 1e-6..=100.0, "a number from 1e-6 to 100")
     }
 }
