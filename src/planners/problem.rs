@@ -46,8 +46,7 @@ impl Problem {
 
     /// The problem of a validated scene.
     pub fn new(scene: &Scene) -> Result<Problem, ProblemError> {
-        let SpotGuess { frame, kind } = spot::guess(scene);
-        let obstacles = scene.geometry_seen_from(&frame);
+        let SpotGuess { frame, kind, obstacles } = spot::guess(scene);
         let bounds = scene.bounds.map(|b| spot::bounds_in_frame(b, &frame));
         let start = frame.local_from_world(scene.start);
         let goal = frame.local_from_world(scene.goal);

@@ -174,6 +174,18 @@ impl Vehicle {
         center.shifted(-self.center_offset())
     }
 
+    /// Whether `other` can drive whatever this vehicle can, wherever this one fits: its footprint
+    /// lies within this one's, the rear axles upon each other, and it turns at least as tightly.
+    pub fn covers(&self, other: &Vehicle) -> bool {
+        /// Half a millimetre: vehicles given with few decimals stay usable.
+        const TOLERANCE: f64 = 5e-4;
+        let within = |own: f64, others: f64| others <= own + TOLERANCE;
+        within(self.rear_overhang, other.rear_overhang)
+            && within(self.front_extent(), other.front_extent())
+            && within(self.width, other.width)
+            && within(self.turning_radius(), other.turning_radius())
+    }
+
     /// Speed in `gear`, m/s.
     pub fn speed(&self, gear: Gear) -> f64 {
         match gear {

@@ -1,31 +1,102 @@
-//! From a scene to its planning frame.
+//! From a scene to its planning frame: where the spot is, what it is, and where the lane lies.
 //!
-//! Where the parking type is known the frame is the spot frame: origin at the parked
-//! body's centre, +x along the lane in the direction of travel, +y out of the spot toward
-//! the lane. A spot on the driver's left gives a left-handed, mirrored frame. Where it is
-//! unknown the goal's own frame serves: results then still do not depend on where in the
-//! world the scene lies.
+//! The frame is the spot frame: origin at the parked body's centre, +x along the lane in the
+//! direction of travel, +y out of the spot toward the lane. A spot on the driver's left gives a
+//! left-handed, mirrored frame. Where nothing around the goal looks like a spot beside a lane, the
+//! goal's own frame serves: results then still do not depend on where in the world the scene
+//! lies.
+//!
+//! A goal alone does not say which way its lane lies: ahead of the nose (parked in reverse),
+//! behind the tail (forward) or beside the car (parallel, on either side), each travelled in one of two
+//! directions. Each of these is held against the obstacles by [`super::abstraction`]: it is possible
+//! where the smallest cell is free. A parking type given with the scene leaves only its two
+//! directions to choose from.
 
-use super::{ParkingType, Scene};
-use crate::geometry::{Frame, Pose, Vec2};
+use super::abstraction::{Abstraction, abstractions};
+use super::cell::Grid;
+use super::{Obstacles, ParkingType, Scene};
+use crate::geometry::{Aabb, Frame, Pose, Vec2, segment_in_box};
 
-/// Where a scene's spot lies and what it is.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A scene seen from its planning frame.
+#[derive(Clone, Debug, PartialEq)]
 pub struct SpotGuess {
-    /// The spot frame in the world (the goal's own frame where no spot is known).
+    /// The spot frame in the world (the goal's own frame where no spot was found).
     pub frame: Frame,
-    /// The parking type, where known.
+    /// The parking type, given or found.
     pub kind: Option<ParkingType>,
+    /// The obstacles, seen from the frame.
+    pub obstacles: Obstacles,
 }
 
 /// The planning frame of a scene.
 pub fn guess(scene: &Scene) -> SpotGuess {
     let Some(kind) = scene.parking_type else {
-        return SpotGuess {
-            frame: Frame { origin_in_world: scene.goal, mirrored: false },
-            kind: None,
-        };
+        return found(scene).unwrap_or_else(|| {
+            seen(scene, Frame { origin_in_world: scene.goal, mirrored: false }, None)
+        });
     };
+    let usual = spot_frame(scene, kind);
+    let guess = seen(scene, usual, Some(kind));
+    if lane_is_open(&guess.obstacles, kind) || lane(&guess).is_some() {
+        return guess;
+    }
+    // The car may come from the other side, or stand across the lane.
+    let other = seen(scene, other_way(&usual, kind), Some(kind));
+    if lane(&other).is_some() { other } else { guess }
+}
+
+/// The likeliest spot: the car stands in its lane rather than elsewhere, and the lane is large.
+fn found(scene: &Scene) -> Option<SpotGuess> {
+    let mut best: Option<((bool, f64), SpotGuess)> = None;
+    for kind in ParkingType::ALL {
+        let usual = spot_frame(scene, kind);
+        for frame in [usual, other_way(&usual, kind)] {
+            let guess = seen(scene, frame, Some(kind));
+            let Some(lane) = lane(&guess) else { continue };
+            let merit = merit(&lane, frame.local_from_world(scene.start));
+            if best.as_ref().is_none_or(|(most, _)| merit > *most) {
+                best = Some((merit, guess));
+            }
+        }
+    }
+    best.map(|(_, guess)| guess)
+}
+
+fn seen(scene: &Scene, frame: Frame, kind: Option<ParkingType>) -> SpotGuess {
+    SpotGuess { frame, kind, obstacles: scene.geometry_seen_from(&frame) }
+}
+
+/// The largest free lane beside the spot, if there is one.
+fn lane(guess: &SpotGuess) -> Option<Abstraction> {
+    abstractions(&guess.obstacles, guess.kind?, &Grid::default()).first().copied()
+}
+
+/// Whether the car starts in the lane, and the lane's area.
+fn merit(lane: &Abstraction, start: Pose) -> (bool, f64) {
+    /// A car slightly out of its lane is in it.
+    const SLACK: f64 = 1.0;
+    let [area, _] = lane.regions(&Grid::default());
+    let in_lane =
+        start.y > area.min.y - SLACK && start.y < area.min.y + lane.measured.lane_width + SLACK;
+    let size = area.max - area.min;
+    (in_lane, size.x * size.y)
+}
+
+/// Whether nothing at all enters the smallest lane beside the spot: a quick answer for scenes
+/// where the given type is right.
+fn lane_is_open(obstacles: &Obstacles, kind: ParkingType) -> bool {
+    let grid = Grid::default();
+    let boundary = grid.lane_boundary(kind);
+    let top = boundary + grid.lane_width.min;
+    let lane = Aabb::new(-grid.back, boundary, grid.dead_end.min, top);
+    !obstacles.edges().any(|(a, b)| {
+        let beside = a.y.max(b.y) < boundary || a.y.min(b.y) > top;
+        !beside && segment_in_box(a, b, &lane)
+    })
+}
+
+/// The spot frame of a parking type, where the car comes from where it stands.
+fn spot_frame(scene: &Scene, kind: ParkingType) -> Frame {
     let center = scene.vehicle.body_center(scene.goal);
     // Right-handed first: the goal heading is `goal_heading` of the kind.
     let x_heading = scene.goal.heading - kind.goal_heading();
@@ -37,15 +108,16 @@ pub fn guess(scene: &Scene) -> SpotGuess {
         // +y leads out of the bay; +x is the direction of travel.
         ParkingType::Forward | ParkingType::Reverse => travels_backward_along_x(start),
     };
-    let frame = match (mirrored, kind.is_bay()) {
-        (false, _) => plain,
-        (true, false) => Frame { mirrored, ..plain },
-        (true, true) => Frame {
-            origin_in_world: Pose { heading: x_heading + std::f64::consts::PI, ..center },
-            mirrored,
-        },
-    };
-    SpotGuess { frame, kind: Some(kind) }
+    if mirrored { other_way(&plain, kind) } else { plain }
+}
+
+/// The frame of the other direction of travel: past a bay the other way, or on the other side of
+/// a parallel spot.
+fn other_way(frame: &Frame, kind: ParkingType) -> Frame {
+    let Frame { origin_in_world: origin, mirrored } = *frame;
+    let turn = if kind.is_bay() { std::f64::consts::PI } else { 0.0 };
+    let heading = origin.heading + if mirrored { -turn } else { turn };
+    Frame { origin_in_world: Pose { heading, ..origin }, mirrored: !mirrored }
 }
 
 /// Whether a car at `start` drives along the lane toward −x: by its heading, or, when it
