@@ -36,9 +36,9 @@ impl Actor {
 #[serde(rename_all = "snake_case")]
 pub enum Choice {
     /// Drawn, as HOPE does in evaluation too.
+    #[default]
     Sampled,
     /// The mean, as far as the mask admits it.
-    #[default]
     Mean,
 }
 

@@ -97,6 +97,9 @@ pub enum TrainingError {
          episodes may differ), or choose another --out", .0.display()
     )]
     OtherCheckpoint(PathBuf),
+    /// A checkpoint that cannot be read.
+    #[error("{0}")]
+    Checkpoint(ArtefactError),
     /// A training that ended before anything was learnt.
     #[error("all episodes went by while warming up; expected more episodes or a smaller warm_up")]
     OnlyWarmUp,

@@ -26,7 +26,8 @@ fn draw(text: &mut String, log: &RlLog) -> Result<(), Box<dyn std::error::Error>
         .build_cartesian_2d(0..last, 0.0..1.0)?;
     let percent = |v: &f64| format!("{:.0} %", 100.0 * v);
     chart.configure_mesh().x_desc("episodes").y_label_formatter(&percent).draw()?;
-    let lines: [(&str, RGBColor, &dyn Fn(&Point) -> f64); 3] = [
+    type Line<'a> = (&'a str, RGBColor, &'a dyn Fn(&Point) -> f64);
+    let lines: [Line; 3] = [
         ("training, since the point before", BLACK, &Point::success),
         ("validation, drawn actions", BLUE, &|p| f64::from(p.sampled.total()) / problems),
         ("validation, mean within the mask", RED, &|p| f64::from(p.mean.total()) / problems),

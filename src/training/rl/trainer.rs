@@ -151,7 +151,8 @@ impl Trainer {
         path: &Path,
         device: &Device,
     ) -> Result<Self, TrainingError> {
-        let (state, agent, replay) = checkpoint::read(path, device)?;
+        let (state, agent, replay) =
+            checkpoint::read(path, device).map_err(TrainingError::Checkpoint)?;
         // More episodes only make it longer.
         let same = RlConfig { episodes: config.episodes, ..state.log.config.clone() };
         if same != *config || state.log.course != course {
