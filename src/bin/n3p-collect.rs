@@ -8,6 +8,7 @@ use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::dataset::{self, CollectConfig, CollectOptions, Dataset, Part, TypeReport};
 use n3p::progress;
+use n3p::vehicle::Vehicle;
 use n3p::world::ParkingType;
 
 /// Collects training samples: Hybrid A* with Reeds-Shepp expansion in every cell of the grid.
@@ -22,6 +23,9 @@ struct Args {
     /// Settings, a TOML file; the defaults when omitted
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// The vehicle, a TOML file such as experiments/vehicles/tpcap.toml; overrides the settings
+    #[arg(long, value_name = "FILE")]
+    vehicle: Option<PathBuf>,
     /// Folder of the data set
     #[arg(long, value_name = "DIR", default_value = "datasets/default")]
     out: PathBuf,
@@ -42,10 +46,13 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let config = match &args.config {
+    let mut config = match &args.config {
         Some(path) => CollectConfig::read(path).or_bad_input()?,
         None => CollectConfig::default(),
     };
+    if let Some(path) = &args.vehicle {
+        config.vehicle = Vehicle::read(path).or_bad_input()?;
+    }
     let kinds = args.kind.map_or(ParkingType::ALL.to_vec(), |kind| vec![kind]);
     let options = CollectOptions { resume: args.resume, part: args.shard };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.into()).build()?;

@@ -18,7 +18,8 @@ use n3p::world::{Level, ParkingType};
 #[command(version)]
 struct Args {
     /// A trained model; may be given several times. Bare names are looked for in the
-    /// working folder, then in models/.
+    /// working folder, then in models/ [default: what the methods named need, such as
+    /// knn.bin, from the same places].
     #[arg(long = "model", value_name = "FILE")]
     models: Vec<String>,
     /// A driving policy from outside, the method "policy": an .onnx file, or the command of a
@@ -69,8 +70,11 @@ fn main() -> ExitCode {
 
 fn evaluate(args: &Args) -> Result<ExitCode> {
     let policy = args.policy.as_deref().map(|p| PolicySource::new(p, args.policy_limit));
-    let models =
-        Models::load(&args.models).or_bad_input()?.with_policy(policy.transpose().or_bad_input()?);
+    let models = match &args.models[..] {
+        [] => Models::usual(&args.methods),
+        given => Models::load(given),
+    };
+    let models = models.or_bad_input()?.with_policy(policy.transpose().or_bad_input()?);
     let config = SuiteConfig {
         methods: match &args.methods[..] {
             [] => Method::available(&models),
@@ -113,13 +117,14 @@ fn cases(args: &Args, methods: &[Method], models: &Models) -> Result<(Vec<Case>,
         return Ok((cases, title));
     }
     // Without --type: all that the models of the chosen methods know.
-    let known = |k: &ParkingType| methods.iter().all(|m| models.check_kind(*m, *k).is_ok());
+    let vehicle = models.vehicle().unwrap_or_default();
+    let known =
+        |k: &ParkingType| methods.iter().all(|m| models.check_kind(*m, &vehicle, *k).is_ok());
     let kinds = match args.kind {
         Some(kind) => vec![kind],
         None => ParkingType::ALL.into_iter().filter(known).collect(),
     };
     let levels = args.level.map_or(Level::ALL.to_vec(), |l| vec![l]);
-    let vehicle = models.vehicle().unwrap_or_default();
     let cases = suite::generated(&vehicle, &kinds, &levels, args.count as usize, args.seed)
         .or_bad_input()?;
     let title = format!(

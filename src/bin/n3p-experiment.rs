@@ -10,6 +10,7 @@ use n3p::evaluation::{report, rows};
 use n3p::experiments::{ExperimentConfig, ExperimentError, Given, runner};
 use n3p::files::reason;
 use n3p::training;
+use n3p::vehicle::Vehicle;
 
 /// Runs experiments: collect, train, evaluate and report, all from one file.
 #[derive(Parser)]
@@ -63,6 +64,9 @@ struct GivenArgs {
     /// other models are made
     #[arg(long, value_name = "DIR", conflicts_with = "models")]
     policies: Option<PathBuf>,
+    /// Another vehicle than the experiment's, a TOML file; its name joins that of the results
+    #[arg(long, value_name = "FILE")]
+    vehicle: Option<PathBuf>,
 }
 
 impl From<&GivenArgs> for Given {
@@ -82,14 +86,25 @@ fn main() -> ExitCode {
     training::single_threaded();
     let args = cli::parse::<Cli>();
     cli::run(|| match &args.command {
-        Command::Run { file, out, given } => run(file, out.as_deref(), &given.into()),
-        Command::Reproduce { file, out, given } => reproduce(file, out.as_deref(), &given.into()),
+        Command::Run { file, out, given } => run(file, out.as_deref(), given),
+        Command::Reproduce { file, out, given } => reproduce(file, out.as_deref(), given),
         Command::List { folder } => list(folder),
     })
 }
 
-fn run(file: &Path, out: Option<&Path>, given: &Given) -> Result<ExitCode> {
+/// The experiment, with the vehicle given.
+fn read(file: &Path, args: &GivenArgs) -> Result<ExperimentConfig> {
     let config = ExperimentConfig::read(file).or_bad_input()?;
+    let Some(path) = &args.vehicle else { return Ok(config) };
+    let vehicle = Vehicle::read(path).or_bad_input()?;
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    let name: String = stem.chars().map(|c| if plain(c) { c } else { '-' }).collect();
+    Ok(config.with_vehicle(vehicle, &name))
+}
+
+fn run(file: &Path, out: Option<&Path>, args: &GivenArgs) -> Result<ExitCode> {
+    let (config, given) = (read(file, args)?, &Given::from(args));
     let out = out.map_or_else(|| results(file, &config), Path::to_owned);
     let rows = runner::run(&config, given, &out).map_err(exit_code)?;
     cli::print(report::text(&rows, config.evaluate.seed).trim_end())?;
@@ -97,8 +112,8 @@ fn run(file: &Path, out: Option<&Path>, given: &Given) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn reproduce(file: &Path, out: Option<&Path>, given: &Given) -> Result<ExitCode> {
-    let config = ExperimentConfig::read(file).or_bad_input()?;
+fn reproduce(file: &Path, out: Option<&Path>, args: &GivenArgs) -> Result<ExitCode> {
+    let (config, given) = (read(file, args)?, &Given::from(args));
     let recorded = results(file, &config).join("rows.csv");
     if !recorded.exists() {
         let text = format!(

@@ -9,7 +9,7 @@ use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::evaluation::draw::{Drawing, scene_svg};
 use n3p::evaluation::{
-    Case, Episode, EpisodeConfig, Method, MethodSettings, Models, episode, trace,
+    Case, Episode, EpisodeConfig, Method, MethodSettings, Models, SpotReport, episode, trace,
 };
 use n3p::files::{check_writable, reason, write_whole};
 use n3p::planners::Problem;
@@ -85,10 +85,15 @@ fn plan(args: &Args) -> Result<ExitCode> {
         write_whole(svg, picture.as_bytes()).map_err(|e| unwritable(svg, e))?;
     }
     if args.json {
-        let result = serde_json::json!({"row": episode.row, "path": episode.path});
+        let (row, path) = (&episode.row, &episode.path);
+        let spot = SpotReport::new(&episode, &models);
+        let result = serde_json::json!({"row": row, "path": path, "spot": spot});
         cli::print(result)?;
     } else {
         cli::print(summary(&episode))?;
+        if let Some(spot) = SpotReport::new(&episode, &models) {
+            cli::print(spot)?;
+        }
     }
     match (&episode.path, episode.row.ok) {
         (None, _) => Ok(ExitCode::from(cli::EXIT_NO_PATH)),
@@ -108,14 +113,15 @@ fn choose(args: &Args, scene: &Scene, problem: &Problem) -> Result<(Method, Mode
     let other = if policy.is_some() { Method::Policy } else { Method::N3p };
     let method = args.method.unwrap_or(other);
     let models = match &args.models[..] {
-        [] => Models::usual(method),
+        [] => Models::usual(&[method]),
         given => Models::load(given),
     };
     let models = models.or_bad_input()?.with_policy(policy);
     let fits = || -> Result<()> {
         method.build(&models, &MethodSettings::default()).or_bad_input()?;
-        models.check_vehicle(&scene.name, &scene.vehicle).or_bad_input()?;
-        problem.kind.map_or(Ok(()), |kind| models.check_kind(method, kind)).or_bad_input()
+        models.check_vehicle(method, &scene.name, &scene.vehicle).or_bad_input()?;
+        let check = |kind| models.check_kind(method, &scene.vehicle, kind);
+        problem.kind.map_or(Ok(()), check).or_bad_input()
     };
     let told = args.method.is_some() || !args.models.is_empty();
     match (if method.needs_model() { fits() } else { Ok(()) }, told) {
@@ -146,8 +152,8 @@ fn summary(episode: &Episode) -> String {
         format!("  planning time     {time:.3} ms"),
         format!("  expansions        {}", row.nodes),
     ];
-    if !row.route.is_empty() {
-        lines.push(format!("  route             {}", row.route));
+    if let Some(guidance) = &episode.result.guidance {
+        lines.push(format!("  route             {}", guidance.route.explanation()));
     }
     lines.join("\n")
 }

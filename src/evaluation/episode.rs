@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::export::PathFile;
 use super::oracle;
 use super::rows::Row;
-use crate::planners::{Budget, PARKED_COVER, PlanResult, Planner, Problem, ProblemError, Route};
+use crate::planners::{Budget, PARKED_COVER, PlanResult, Planner, Problem, ProblemError};
 use crate::world::{Level, ParkingType, Scene};
 
 /// A scene to evaluate, and how it is labelled.
@@ -129,7 +129,7 @@ fn describe(
 ) -> Option<PathFile> {
     row.nodes = result.expansions as u32;
     if let Some(guidance) = &result.guidance {
-        row.fallback = guidance.route == Route::Fallback;
+        row.fallback = guidance.route.is_fallback();
         row.route = guidance.route.name().to_owned();
     }
     let path = match &result.outcome {

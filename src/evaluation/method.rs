@@ -5,7 +5,8 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::models::Models;
+use super::by_vehicle::ByVehicle;
+use super::models::{Models, VehicleModels};
 use crate::planners::{
     HybridAStar, HybridAStarConfig, MultiHeuristicHybridAStar, PlainHybridAStar, Planner,
     ScenarioHybridAStar,
@@ -173,39 +174,51 @@ impl Method {
         Self::ALL.into_iter().filter(|m| m.build(models, &settings).is_ok()).collect()
     }
 
+    /// The planner of a learnt method with the models of one vehicle, which hold what it needs.
+    fn learnt(self, models: &VehicleModels, settings: &MethodSettings) -> Box<dyn Planner + Send> {
+        let MethodSettings { planner: config, n3p, rl } = settings;
+        if let Some(actor) = self.course().and_then(|course| models.actor(course)) {
+            let policy = ActorPolicy::new(actor.clone(), rl.choice);
+            return Box::new(PolicyPlanner::new(self.name(), policy, *rl, *config));
+        }
+        let selector = models.selector(self).expect("models that serve the method");
+        Box::new(match self {
+            Self::N3p => GuidedPlanner::ranked(self.name(), selector, *config, *n3p),
+            _ => GuidedPlanner::paper(self.name(), selector, *config),
+        })
+    }
+
+    /// That there is no model, and how to get one.
+    fn no_model(self) -> MethodError {
+        let (model, example) = match (self, self.course()) {
+            (_, Some(course)) => {
+                return MethodError::NoTrainedPolicy { course: course.name() };
+            }
+            (Self::MlpN3p, _) => ("mlp", "mlp-TYPE.safetensors"),
+            _ => ("knn", "knn.bin"),
+        };
+        MethodError::NoModel { method: self, model, example }
+    }
+
     /// The planner of this method.
     pub fn build(
         self,
         models: &Models,
         settings: &MethodSettings,
     ) -> Result<Box<dyn Planner + Send>, MethodError> {
-        let MethodSettings { planner: config, n3p, rl } = settings;
-        let no_model = |model, example| MethodError::NoModel { method: self, model, example };
-        let selector = models.selector(self);
+        let MethodSettings { planner: config, rl, .. } = settings;
         match self {
             Self::Ha => Ok(Box::new(PlainHybridAStar::new(*config))),
             Self::HaRs => Ok(Box::new(HybridAStar::new(*config))),
             Self::HaHold => Ok(Box::new(HybridAStar::hold(*config, HOLD_SOLUTIONS))),
             Self::Mhha => Ok(Box::new(MultiHeuristicHybridAStar::new(*config))),
             Self::Sha => Ok(Box::new(ScenarioHybridAStar::new(*config))),
-            Self::KnnN3p => {
-                let selector = selector.ok_or_else(|| no_model("knn", "knn.bin"))?;
-                Ok(Box::new(GuidedPlanner::paper(self.name(), selector, *config)))
-            }
-            Self::MlpN3p => {
-                let selector = selector.ok_or_else(|| no_model("mlp", "mlp-TYPE.safetensors"))?;
-                Ok(Box::new(GuidedPlanner::paper(self.name(), selector, *config)))
-            }
-            Self::N3p => {
-                let selector = selector.ok_or_else(|| no_model("knn", "knn.bin"))?;
-                Ok(Box::new(GuidedPlanner::ranked(self.name(), selector, *config, *n3p)))
-            }
-            Self::RlSimple | Self::RlEval => {
-                let course = if self == Self::RlSimple { Course::Simple } else { Course::Eval };
-                let actor = models.actor(course);
-                let actor = actor.ok_or(MethodError::NoTrainedPolicy { course: course.name() })?;
-                let policy = ActorPolicy::new(actor.clone(), rl.choice);
-                Ok(Box::new(PolicyPlanner::new(self.name(), policy, *rl, *config)))
+            Self::KnnN3p | Self::MlpN3p | Self::N3p | Self::RlSimple | Self::RlEval => {
+                let planners = models.for_method(self).map(|of_vehicle| {
+                    let planner = self.learnt(of_vehicle, settings);
+                    (*of_vehicle.vehicle(), planner)
+                });
+                ByVehicle::new(planners.collect()).ok_or_else(|| self.no_model())
             }
             Self::Policy => {
                 let source = models.outside_policy().ok_or(MethodError::NoPolicy)?;

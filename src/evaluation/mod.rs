@@ -8,6 +8,7 @@
 //! paths. [`learning_curve`] is what experiments add: how much data is enough.
 
 pub mod draw;
+pub mod by_vehicle;
 pub mod episode;
 pub mod export;
 pub mod html;
@@ -19,6 +20,7 @@ pub mod oracle;
 mod outputs;
 pub mod report;
 pub mod rows;
+pub mod spot_report;
 pub mod suite;
 pub mod table;
 pub mod trace;
@@ -30,4 +32,5 @@ pub use method::{Method, MethodError, MethodSettings};
 pub use models::{Models, ModelsError};
 pub use outputs::{OutputError, Outputs};
 pub use rows::Row;
+pub use spot_report::SpotReport;
 pub use suite::{SuiteConfig, SuiteError};

@@ -15,18 +15,24 @@ use crate::selectors::mlp::MlpSelector;
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
 
-/// At most one KNN and one MLP selector and one policy of each course, all trained for one
-/// vehicle; and a policy from outside.
+/// Trained models of any number of vehicles, and a policy from outside.
 #[derive(Clone, Default)]
 pub struct Models {
-    knn: Option<Arc<dyn PoseSelector>>,
-    mlp: Option<Arc<dyn PoseSelector>>,
-    actors: BTreeMap<Course, Actor>,
+    /// In the order of their first files.
+    vehicles: Vec<VehicleModels>,
     outside: Option<PolicySource>,
-    origin: Option<Origin>,
 }
 
-/// Where the first model comes from, and whom it was trained for.
+/// The models of one vehicle: at most one KNN and one MLP selector and one policy of each course.
+#[derive(Clone)]
+pub struct VehicleModels {
+    origin: Origin,
+    knn: Option<Arc<dyn PoseSelector>>,
+    mlp: Option<Arc<MlpSelector>>,
+    actors: BTreeMap<Course, Actor>,
+}
+
+/// Where a vehicle's first model comes from, and whom it was trained for.
 #[derive(Clone, Debug)]
 struct Origin {
     path: PathBuf,
@@ -79,54 +85,54 @@ impl Models {
     /// then in `models/`. Networks of several parking types join into one selector.
     pub fn load<P: AsRef<Path>>(names: &[P]) -> Result<Self, ModelsError> {
         let mut models = Self::default();
-        let mut networks: Option<MlpSelector> = None;
         for name in names {
             let path = find_model(name);
-            let model = match Model::load(&path) {
-                Err(ArtefactError { fault: Fault::Policy, .. }) => {
-                    models.add_policy(path)?;
-                    continue;
-                }
-                model => model?,
-            };
-            models.add_origin(Origin::of(&model))?;
-            match model {
-                Model::Knn(knn) if models.knn.is_some() => {
-                    return Err(ModelsError::TwoKnn(knn.path().to_owned()));
-                }
-                Model::Knn(knn) => models.knn = Some(Arc::new(knn)),
-                Model::Mlp(mlp) => {
-                    networks = Some(match networks {
-                        Some(others) => others.combine(mlp)?,
-                        None => mlp,
-                    });
-                }
+            match Model::load(&path) {
+                Err(ArtefactError { fault: Fault::Policy, .. }) => models.add_policy(path)?,
+                model => models.add_selector(model?)?,
             }
         }
-        models.mlp = networks.map(|n| Arc::new(n) as Arc<dyn PoseSelector>);
         Ok(models)
+    }
+
+    fn add_selector(&mut self, model: Model) -> Result<(), ModelsError> {
+        let own = self.of_exactly(Origin::of(&model));
+        match model {
+            Model::Knn(knn) if own.knn.is_some() => {
+                return Err(ModelsError::TwoKnn(knn.path().to_owned()));
+            }
+            Model::Knn(knn) => own.knn = Some(Arc::new(knn)),
+            Model::Mlp(mlp) => {
+                own.mlp = Some(Arc::new(match own.mlp.take() {
+                    Some(others) => Arc::unwrap_or_clone(others).combine(mlp)?,
+                    None => mlp,
+                }));
+            }
+        }
+        Ok(())
     }
 
     fn add_policy(&mut self, path: PathBuf) -> Result<(), ModelsError> {
         let (header, actor) = policy_file::load(&path)?;
         let course = header.course;
-        if self.actors.insert(course, actor).is_some() {
+        let training = artefact::policy_training(course.name());
+        let own =
+            self.of_exactly(Origin { path: path.clone(), training, vehicle: header.vehicle });
+        if own.actors.insert(course, actor).is_some() {
             return Err(ModelsError::TwoPolicies { path, course: course.name() });
         }
-        let training = artefact::policy_training(course.name());
-        self.add_origin(Origin { path, training, vehicle: header.vehicle })
+        Ok(())
     }
 
-    /// The first one's vehicle is everyone's.
-    fn add_origin(&mut self, new: Origin) -> Result<(), ModelsError> {
-        match &self.origin {
-            Some(first) => {
-                let Origin { path, training, vehicle } = &new;
-                artefact::check_vehicle(path, training, vehicle, &first.vehicle)?;
-            }
-            None => self.origin = Some(new),
-        }
-        Ok(())
+    /// The models of the very vehicle of `origin`, none so far if it is new.
+    fn of_exactly(&mut self, origin: Origin) -> &mut VehicleModels {
+        let known = |m: &VehicleModels| m.origin.vehicle.is_like(&origin.vehicle);
+        let at = self.vehicles.iter().position(known).unwrap_or_else(|| {
+            let actors = BTreeMap::new();
+            self.vehicles.push(VehicleModels { origin, knn: None, mlp: None, actors });
+            self.vehicles.len() - 1
+        });
+        &mut self.vehicles[at]
     }
 
     /// The same with a policy from outside.
@@ -134,74 +140,123 @@ impl Models {
         Self { outside, ..self }
     }
 
-    /// The trained policy of a course, if any.
-    pub fn actor(&self, course: Course) -> Option<&Actor> {
-        self.actors.get(&course)
-    }
-
     /// The policy from outside, if any.
     pub fn outside_policy(&self) -> Option<&PolicySource> {
         self.outside.as_ref()
     }
 
-    /// Loads what `method` needs from the usual files (`knn.bin`, `mlp-TYPE.safetensors`),
-    /// as far as they exist.
-    pub fn usual(method: Method) -> Result<Self, ModelsError> {
-        let names: Vec<String> = match method {
-            Method::KnnN3p | Method::N3p => vec!["knn.bin".to_owned()],
-            Method::MlpN3p => {
-                ParkingType::ALL.iter().map(|k| format!("mlp-{k}.safetensors")).collect()
-            }
-            _ => method.course().map(policy_file::usual_name).into_iter().collect(),
-        };
-        let found: Vec<PathBuf> =
-            names.iter().map(find_model).filter(|path| path.exists()).collect();
+    /// Loads what `methods` need from the usual files, as far as they exist: `knn.bin` and
+    /// `knn-….bin`, `mlp-TYPE.safetensors`, `rl-COURSE.safetensors`.
+    pub fn usual(methods: &[Method]) -> Result<Self, ModelsError> {
+        let needs = |method: Method| methods.contains(&method);
+        let mut found = Vec::new();
+        if needs(Method::KnnN3p) || needs(Method::N3p) {
+            found.push(find_model("knn.bin"));
+            found.extend(knn_of_other_vehicles());
+        }
+        if needs(Method::MlpN3p) {
+            let network = |kind| find_model(format!("mlp-{kind}.safetensors"));
+            found.extend(ParkingType::ALL.map(network));
+        }
+        let courses = methods.iter().filter_map(|m| m.course());
+        found.extend(courses.map(|c| find_model(policy_file::usual_name(c))));
+        found.retain(|path| path.exists());
         Self::load(&found)
     }
 
-    /// The KNN selector, if any.
-    pub fn knn(&self) -> Option<Arc<dyn PoseSelector>> {
-        self.knn.clone()
+    /// The models that `method` plans with, vehicle by vehicle.
+    pub fn for_method(&self, method: Method) -> impl Iterator<Item = &VehicleModels> {
+        self.vehicles.iter().filter(move |m| m.serve(method))
     }
 
-    /// The MLP selector, if any.
-    pub fn mlp(&self) -> Option<Arc<dyn PoseSelector>> {
-        self.mlp.clone()
+    /// The models that `method` plans with for `vehicle`: its own, or else the first that were
+    /// trained for one that covers it ([`Vehicle::covers`]).
+    pub fn serving(&self, method: Method, vehicle: &Vehicle) -> Option<&VehicleModels> {
+        let own = self.for_method(method).find(|m| m.vehicle().is_like(vehicle));
+        own.or_else(|| self.for_method(method).find(|m| m.vehicle().covers(vehicle)))
     }
 
-    /// The selector that `method` plans with; `None` where it needs none or has none.
-    pub fn selector(&self, method: Method) -> Option<Arc<dyn PoseSelector>> {
-        match method {
-            Method::KnnN3p => self.knn(),
-            Method::MlpN3p => self.mlp(),
-            Method::N3p => self.knn().or_else(|| self.mlp()),
-            _ => None,
-        }
+    /// The selector that `method` plans with for `vehicle`; `None` where it needs none or has
+    /// none.
+    pub fn selector(&self, method: Method, vehicle: &Vehicle) -> Option<Arc<dyn PoseSelector>> {
+        self.serving(method, vehicle)?.selector(method)
     }
 
-    /// The vehicle that the models were trained for; `None` without models.
+    /// The vehicle that the first model was trained for; `None` without models.
     pub fn vehicle(&self) -> Option<Vehicle> {
-        self.origin.as_ref().map(|o| o.vehicle)
+        self.vehicles.first().map(|m| m.origin.vehicle)
     }
 
-    /// Refuses a scene with another vehicle than the models'.
-    pub fn check_vehicle(&self, scene: &str, vehicle: &Vehicle) -> Result<(), ModelsError> {
-        let Some(Origin { path, training, vehicle: trained }) = &self.origin else {
+    /// Refuses a scene whose vehicle no model of `method` serves.
+    pub fn check_vehicle(
+        &self,
+        method: Method,
+        scene: &str,
+        vehicle: &Vehicle,
+    ) -> Result<(), ModelsError> {
+        let Some(any) = self.for_method(method).next() else { return Ok(()) };
+        if self.serving(method, vehicle).is_some() {
             return Ok(());
-        };
+        }
+        let Origin { path, training, vehicle: trained } = &any.origin;
         artefact::check_vehicle(path, training, trained, vehicle)
             .map_err(|error| ModelsError::Vehicle { scene: scene.to_owned(), error })
     }
 
-    /// Refuses a parking type that `method`'s model was not trained for.
-    pub fn check_kind(&self, method: Method, kind: ParkingType) -> Result<(), ModelsError> {
-        let Some(selector) = self.selector(method) else { return Ok(()) };
+    /// Refuses a parking type that `method`'s model for `vehicle` was not trained for.
+    pub fn check_kind(
+        &self,
+        method: Method,
+        vehicle: &Vehicle,
+        kind: ParkingType,
+    ) -> Result<(), ModelsError> {
+        let Some(selector) = self.selector(method, vehicle) else { return Ok(()) };
         let kinds = selector.kinds();
         if kinds.contains(&kind) {
             return Ok(());
         }
         let known = kinds.iter().map(|k| k.name()).collect::<Vec<_>>().join(", ");
         Err(ModelsError::Kind { method, kind, known })
+    }
+}
+
+/// Files `models/knn-….bin`, by name.
+fn knn_of_other_vehicles() -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir("models") else { return Vec::new() };
+    let mut found: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
+    found.retain(|path| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with("knn-") && name.ends_with(".bin")
+    });
+    found.sort();
+    found
+}
+
+impl VehicleModels {
+    /// The vehicle they were trained for.
+    pub fn vehicle(&self) -> &Vehicle {
+        &self.origin.vehicle
+    }
+
+    /// The selector that `method` plans with, if there is one.
+    pub fn selector(&self, method: Method) -> Option<Arc<dyn PoseSelector>> {
+        let mlp = || self.mlp.clone().map(|m| m as Arc<dyn PoseSelector>);
+        match method {
+            Method::KnnN3p => self.knn.clone(),
+            Method::MlpN3p => mlp(),
+            Method::N3p => self.knn.clone().or_else(mlp),
+            _ => None,
+        }
+    }
+
+    /// The trained policy of a course, if there is one.
+    pub fn actor(&self, course: Course) -> Option<&Actor> {
+        self.actors.get(&course)
+    }
+
+    /// Whether they hold what `method` plans with.
+    fn serve(&self, method: Method) -> bool {
+        self.selector(method).is_some() || method.course().is_some_and(|c| self.actor(c).is_some())
     }
 }
 

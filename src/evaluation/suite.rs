@@ -118,11 +118,11 @@ pub fn check(cases: &[Case], models: &Models, config: &SuiteConfig) -> Result<()
         if !names.insert(&scene.name) {
             return Err(SuiteError::SameName(scene.name.clone()));
         }
-        if config.methods.iter().any(|m| m.needs_model()) {
-            models.check_vehicle(&scene.name, &scene.vehicle)?;
-        }
-        if let Some(kind) = case.kind {
-            config.methods.iter().try_for_each(|m| models.check_kind(*m, kind))?;
+        for &method in &config.methods {
+            models.check_vehicle(method, &scene.name, &scene.vehicle)?;
+            if let Some(kind) = case.kind {
+                models.check_kind(method, &scene.vehicle, kind)?;
+            }
         }
         Problem::new(scene)
             .map_err(|error| SuiteError::Unsolvable { scene: scene.name.clone(), error })?;

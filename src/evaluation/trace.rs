@@ -68,7 +68,7 @@ impl Trace {
 pub fn regions(episode: &Episode, models: &Models) -> Option<[Polygon; 2]> {
     let found = episode.result.guidance.as_ref()?.abstraction?;
     let method: Method = episode.row.method.parse().ok()?;
-    let selector = models.selector(method)?;
+    let selector = models.selector(method, &episode.problem.vehicle)?;
     let frame = &episode.problem.frame;
     let to_world = |region: Aabb| {
         Polygon::rectangle(Pose::default(), region).map(|v: Vec2| frame.world_from_local_point(v))

@@ -188,6 +188,12 @@ impl ExperimentConfig {
         Ok(config)
     }
 
+    /// The same experiment with another vehicle; its name says so.
+    pub fn with_vehicle(self, vehicle: Vehicle, name: &str) -> Self {
+        let name = format!("{}-{name}", self.name);
+        Self { vehicle, name, ..self }.resolved()
+    }
+
     /// The same with the common settings copied to where they are used.
     fn resolved(mut self) -> Self {
         self.collect.vehicle = self.vehicle;

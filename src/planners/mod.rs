@@ -166,6 +166,10 @@ pub enum Route {
     Searched,
     /// The full search from start to goal, as the last resort.
     Fallback,
+    /// The full search: the lane beside the spot is smaller than the model's smallest.
+    NoLane,
+    /// The full search: nothing around the goal looks like a spot beside a lane.
+    NoSpot,
 }
 
 impl Route {
@@ -176,6 +180,25 @@ impl Route {
             Route::Direct => "direct",
             Route::Searched => "searched",
             Route::Fallback => "fallback",
+            Route::NoLane => "no-lane",
+            Route::NoSpot => "no-spot",
+        }
+    }
+
+    /// Whether the full search planned the path.
+    pub fn is_fallback(self) -> bool {
+        matches!(self, Route::Fallback | Route::NoLane | Route::NoSpot)
+    }
+
+    /// What it means, in words.
+    pub fn explanation(self) -> &'static str {
+        match self {
+            Route::Library => "a known manoeuvre, joined by one curve; no search",
+            Route::Direct => "curves by way of a preparatory pose; no search",
+            Route::Searched => "a search by way of a preparatory pose",
+            Route::Fallback => "a full search: no known manoeuvre or pose fits here",
+            Route::NoLane => "a full search: no free lane of the model's smallest size by the spot",
+            Route::NoSpot => "a full search: nothing around the goal looks like a spot by a lane",
         }
     }
 }

@@ -95,8 +95,8 @@ pub enum Fault {
     },
     /// Trained for another car.
     #[error(
-        "trained for another vehicle: its {field} is {model}, wanted {wanted}; \
-         train for this vehicle: {command}"
+        "trained for another vehicle: its {field} is {model}, wanted {wanted} (it would serve one \
+         that lies within its own and turns as tightly); train for this vehicle: {command}"
     )]
     OtherVehicle {
         /// Name of the vehicle's field.
@@ -213,24 +213,13 @@ pub fn check_vehicle(
     model: &Vehicle,
     wanted: &Vehicle,
 ) -> Result<(), ArtefactError> {
-    /// Metres or radians: half a millimetre or 0.03°, far below what moves a preparatory
-    /// pose; vehicles given with few decimals stay usable.
-    const TOLERANCE: f64 = 5e-4;
-    let fields = [
-        ("length", model.length, wanted.length),
-        ("width", model.width, wanted.width),
-        ("wheelbase", model.wheelbase, wanted.wheelbase),
-        ("rear_overhang", model.rear_overhang, wanted.rear_overhang),
-        ("max_steer", model.max_steer, wanted.max_steer),
-    ];
-    for (field, model, wanted) in fields {
-        let same = (model - wanted).abs() <= TOLERANCE;
-        if !same {
+    match model.differing_field(wanted) {
+        None => Ok(()),
+        Some((field, model, wanted)) => {
             let command = format!("{training}, with [vehicle] {field} = {wanted} in FILE");
-            return Err(Fault::OtherVehicle { field, model, wanted, command }.of(path));
+            Err(Fault::OtherVehicle { field, model, wanted, command }.of(path))
         }
     }
-    Ok(())
 }
 
 /// How to train a selector of these types.

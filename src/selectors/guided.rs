@@ -288,7 +288,14 @@ impl Planner for GuidedPlanner {
         };
         let expansions = budget.max_expansions - left;
         match planned {
-            Ok((path, guidance)) => {
+            Ok((path, mut guidance)) => {
+                if guidance.route == Route::Fallback {
+                    guidance.route = match problem.kind {
+                        None => Route::NoSpot,
+                        Some(_) if found.is_empty() => Route::NoLane,
+                        Some(_) => Route::Fallback,
+                    };
+                }
                 let result = PlanResult::certified(problem, path, expansions);
                 PlanResult { guidance: Some(guidance), ..result }
             }

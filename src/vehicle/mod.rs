@@ -5,8 +5,11 @@
 
 mod overlap;
 
+use std::path::{Path, PathBuf};
+
 use serde::{Deserialize, Serialize};
 
+use crate::files::{TomlError, read_toml};
 use crate::geometry::{Aabb, Polygon, Pose};
 
 /// Direction of motion.
@@ -90,7 +93,31 @@ pub struct VehicleError {
     pub expected: &'static str,
 }
 
+/// A vehicle file that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum VehicleFileError {
+    /// It cannot be read, or is no TOML of a vehicle.
+    #[error(transparent)]
+    File(#[from] TomlError),
+    /// A field is out of range.
+    #[error("{}: {error}", .path.display())]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// The field.
+        error: VehicleError,
+    },
+}
+
 impl Vehicle {
+    /// Reads and checks a TOML file with the fields of a vehicle.
+    pub fn read(path: &Path) -> Result<Self, VehicleFileError> {
+        let vehicle: Self = read_toml(path)?;
+        let invalid = |error| VehicleFileError::Invalid { path: path.to_owned(), error };
+        vehicle.validate().map_err(invalid)?;
+        Ok(vehicle)
+    }
+
     /// Checks every field.
     pub fn validate(&self) -> Result<(), VehicleError> {
         let check = |field, value: f64, ok: bool, expected| {
@@ -172,6 +199,26 @@ impl Vehicle {
     /// The rear-axle pose whose footprint is centred on `center`.
     pub fn rear_axle(&self, center: Pose) -> Pose {
         center.shifted(-self.center_offset())
+    }
+
+    /// Whether `other` is the same car: dimensions and steering limit agree. Speeds do not matter.
+    pub fn is_like(&self, other: &Vehicle) -> bool {
+        self.differing_field(other).is_none()
+    }
+
+    /// The first dimension in which `other` is another car: its name, and both values.
+    pub fn differing_field(&self, other: &Vehicle) -> Option<(&'static str, f64, f64)> {
+        /// Half a millimetre or 0.03°: vehicles given with few decimals stay usable.
+        const TOLERANCE: f64 = 5e-4;
+        let fields = [
+            ("length", self.length, other.length),
+            ("width", self.width, other.width),
+            ("wheelbase", self.wheelbase, other.wheelbase),
+            ("rear_overhang", self.rear_overhang, other.rear_overhang),
+            ("max_steer", self.max_steer, other.max_steer),
+        ];
+        // Negated, so that NaN differs.
+        fields.into_iter().find(|(_, own, others)| !((own - others).abs() <= TOLERANCE))
     }
 
     /// Whether `other` can drive whatever this vehicle can, wherever this one fits: its footprint

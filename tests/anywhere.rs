@@ -1,0 +1,122 @@
+//! A scene may lie anywhere: shifted, turned or mirrored it is planned the same way.
+
+use std::path::Path;
+
+use n3p::evaluation::{Method, MethodSettings, Models, PathFile, oracle};
+use n3p::geometry::{Frame, Pose, Vec2, signed_angle};
+use n3p::planners::{Budget, Problem};
+use n3p::rng::{Stream, rng};
+use n3p::vehicle::Vehicle;
+use n3p::world::generate::{GeneratorConfig, generate};
+use n3p::world::{Level, ParkingType, Scene};
+use rand::RngExt;
+
+const BUDGET: Budget = Budget { max_expansions: 200_000 };
+
+/// The scene as it lies in `frame`, seen from the world.
+fn moved(scene: &Scene, frame: &Frame) -> Scene {
+    let point = |&[x, y]: &[f64; 2]| <[f64; 2]>::from(frame.world_from_local_point(Vec2::new(x, y)));
+    let mut moved = Scene {
+        start: frame.world_from_local(scene.start),
+        goal: frame.world_from_local(scene.goal),
+        obstacles: scene.obstacles.iter().map(|o| o.iter().map(point).collect()).collect(),
+        points: scene.points.iter().map(point).collect(),
+        // A box that stands aslant is none.
+        bounds: None,
+        ..scene.clone()
+    };
+    if frame.mirrored {
+        moved.obstacles.iter_mut().for_each(|o| o.reverse());
+    }
+    moved
+}
+
+fn frames(seed: u64) -> Vec<Frame> {
+    let mut rng = rng(seed, Stream::Scene, 0);
+    let mut r = |a: f64| rng.random_range(-a..a);
+    let mut frames = vec![Frame { origin_in_world: Pose::new(5e5, -5e5, 0.0), mirrored: false }];
+    for i in 0..5 {
+        let origin_in_world = Pose::new(r(5e5), r(5e5), r(3.1));
+        frames.push(Frame { origin_in_world, mirrored: i % 2 == 0 });
+    }
+    frames
+}
+
+fn check(scenes: &[Scene], methods: &[Method], models: &Models) {
+    for &method in methods {
+        let mut planner = method.build(models, &MethodSettings::default()).unwrap();
+        for (i, scene) in scenes.iter().enumerate() {
+            let scene = Scene { bounds: None, ..scene.clone() };
+            let here = Problem::new(&scene).unwrap();
+            let expected = planner.plan(&here, BUDGET);
+            let path = expected.outcome.as_ref().map(|p| p.to_world(&here.frame));
+            for frame in frames(i as u64) {
+                let there = moved(&scene, &frame);
+                let problem = Problem::new(&there).unwrap();
+                let what = format!("{method}, {}, {frame:?}", scene.name);
+                assert_eq!(problem.kind, here.kind, "{what}");
+                let found = planner.plan(&problem, BUDGET);
+                assert_eq!(found.expansions, expected.expansions, "{what}");
+                let (Ok(path), Ok(found)) = (&path, &found.outcome) else {
+                    assert_eq!(found.outcome, expected.outcome, "{what}");
+                    continue;
+                };
+                let found = found.to_world(&problem.frame);
+                assert_eq!(found.segments.len(), path.segments.len(), "{what}");
+                for ((a, s), (b, t)) in path.legs().zip(found.legs()) {
+                    let b = frame.local_from_world(b);
+                    let apart = a.distance(b) + signed_angle(a.heading, b.heading).abs();
+                    assert!(apart < 1e-6, "{what}: {apart}");
+                    assert!((s.length - t.length).abs() < 1e-6, "{what}");
+                }
+                let file = PathFile::new(&there, &Frame::WORLD, &found, method.name());
+                assert!(oracle::check(&there, &file).is_ok(), "{what}");
+            }
+        }
+    }
+}
+
+fn generated(count: u64, hinted: bool) -> Vec<Scene> {
+    let (config, vehicle) = (GeneratorConfig::default(), Vehicle::default());
+    let mut scenes = Vec::new();
+    for kind in ParkingType::ALL {
+        for level in Level::ALL {
+            for i in 0..count {
+                let scene = generate(&config, &vehicle, kind, level, 808, i);
+                let parking_type = scene.parking_type.filter(|_| hinted);
+                scenes.push(Scene { parking_type, ..scene });
+            }
+        }
+    }
+    scenes
+}
+
+#[test]
+fn generated_scenes_are_planned_the_same_anywhere() {
+    let models = Models::load(&["models/knn.bin"]).unwrap();
+    check(&generated(6, true), &[Method::N3p, Method::HaRs], &models);
+}
+
+#[test]
+fn scenes_without_a_parking_type_are_understood_the_same_anywhere() {
+    let models = Models::load(&["models/knn.bin"]).unwrap();
+    check(&generated(3, false), &[Method::N3p], &models);
+}
+
+#[test]
+fn real_lots_are_planned_the_same_anywhere() {
+    let Some(folder) = ["../shared/scenes/tpcap", "../shared/scenes/dlp"]
+        .map(Path::new)
+        .into_iter()
+        .find(|f| f.exists())
+    else {
+        eprintln!("no real scenes here: skipped");
+        return;
+    };
+    let models = Models::usual(&[Method::N3p]).unwrap();
+    let scenes: Vec<Scene> = [folder, &folder.with_file_name("dlp")]
+        .iter()
+        .flat_map(|f| Scene::read_dir(f).unwrap().into_iter().take(15))
+        .collect();
+    check(&scenes, &[Method::N3p], &models);
+}
