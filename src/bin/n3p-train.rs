@@ -33,6 +33,10 @@ enum Command {
     ///
     /// A model card and a training log are written beside the model.
     Knn(KnnArgs),
+    /// Condenses data sets of several vehicles into manoeuvres for any vehicle
+    ///
+    /// A model card and a training log are written beside the model.
+    Fleet(FleetArgs),
     /// Trains a driving policy by soft actor-critic
     ///
     /// May be interrupted at any moment: the best policy so far is in its file, and --resume goes
@@ -76,6 +80,16 @@ struct KnnArgs {
 }
 
 #[derive(Args)]
+struct FleetArgs {
+    /// Folder of a data set; give one of each vehicle
+    #[arg(long, value_name = "DIR", required = true)]
+    data: Vec<PathBuf>,
+    /// Model file
+    #[arg(long, value_name = "FILE", default_value = "models/fleet.safetensors")]
+    out: PathBuf,
+}
+
+#[derive(Args)]
 struct RlArgs {
     /// Where it learns: in abstracted environments (simple) or in generated scenes (eval)
     #[arg(long = "env", value_name = "ENV")]
@@ -112,6 +126,7 @@ fn main() -> ExitCode {
     cli::run(|| match &cli.command {
         Command::Mlp(args) => mlp(args),
         Command::Knn(args) => knn(args),
+        Command::Fleet(args) => fleet(args),
         Command::Rl(args) => rl(args),
     })
 }
@@ -171,6 +186,19 @@ fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
     }
     let (size, seconds) = (log.bytes as f64 / f64::from(1 << 20), begin.elapsed().as_secs_f64());
     cli::print(format!("{}: {size:.2} MiB, built in {seconds:.2} s", args.out.display()))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn fleet(args: &FleetArgs) -> anyhow::Result<ExitCode> {
+    artefact::check_writable(&args.out).or_bad_input()?;
+    let sets = args.data.iter().map(|folder| Dataset::read(folder, None).or_bad_input());
+    let sets = sets.collect::<anyhow::Result<Vec<_>>>()?;
+    let log = training::fleet::train(&sets, &args.out)
+        .map_err(|e| if e.is_bad_input() { BadInput(e.to_string()).into() } else { anyhow::Error::from(e) })?;
+    for (kind, samples, manoeuvres) in &log.kinds {
+        cli::print(format!("{kind}: {manoeuvres} manoeuvres from {samples} samples"))?;
+    }
+    cli::print(format!("{}: {} vehicles, {} bytes", args.out.display(), log.fleet.len(), log.bytes))?;
     Ok(ExitCode::SUCCESS)
 }
 

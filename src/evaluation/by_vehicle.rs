@@ -3,22 +3,24 @@
 use crate::planners::{Budget, NoPath, PlanResult, Planner, Problem};
 use crate::vehicle::Vehicle;
 
-/// Plans with the planner of the problem's vehicle, or of the first that covers it.
+type Boxed = Box<dyn Planner + Send>;
+
+/// Plans with the planner of the problem's vehicle, or of the first that covers it, or with one
+/// for any vehicle.
 pub(super) struct ByVehicle {
-    planners: Vec<(Vehicle, Box<dyn Planner + Send>)>,
+    planners: Vec<(Vehicle, Boxed)>,
+    any: Option<Boxed>,
 }
 
 impl ByVehicle {
-    /// The planners of a method, each with the vehicle its models were trained for; `None`
-    /// without any.
+    /// The planners of a method, each with the vehicle its models were trained for, and one for any
+    /// other vehicle; `None` without any at all.
     #[expect(clippy::new_ret_no_self, reason = "one planner needs nobody to choose")]
-    pub fn new(
-        mut planners: Vec<(Vehicle, Box<dyn Planner + Send>)>,
-    ) -> Option<Box<dyn Planner + Send>> {
-        match planners.len() {
-            0 => None,
-            1 => planners.pop().map(|(_, planner)| planner),
-            _ => Some(Box::new(Self { planners })),
+    pub fn new(mut planners: Vec<(Vehicle, Boxed)>, any: Option<Boxed>) -> Option<Boxed> {
+        match (planners.len(), &any) {
+            (0, _) => any,
+            (1, None) => planners.pop().map(|(_, planner)| planner),
+            _ => Some(Box::new(Self { planners, any })),
         }
     }
 }
@@ -33,9 +35,10 @@ impl Planner for ByVehicle {
         let own = self.planners.iter().position(|(vehicle, _)| vehicle.is_like(wanted));
         let serving =
             own.or_else(|| self.planners.iter().position(|(vehicle, _)| vehicle.covers(wanted)));
-        match serving {
-            Some(at) => self.planners[at].1.plan(problem, budget),
-            None => PlanResult::none(NoPath::Failed("no model for this vehicle"), 0),
+        match (serving, &mut self.any) {
+            (Some(at), _) => self.planners[at].1.plan(problem, budget),
+            (None, Some(any)) => any.plan(problem, budget),
+            (None, None) => PlanResult::none(NoPath::Failed("no model for this vehicle"), 0),
         }
     }
 }

@@ -218,7 +218,12 @@ impl Method {
                     let planner = self.learnt(of_vehicle, settings);
                     (*of_vehicle.vehicle(), planner)
                 });
-                ByVehicle::new(planners.collect()).ok_or_else(|| self.no_model())
+                let any = models.fleet(self).map(|selector| {
+                    let n3p = settings.n3p;
+                    let planner = GuidedPlanner::ranked(self.name(), selector, *config, n3p);
+                    Box::new(planner) as Box<dyn Planner + Send>
+                });
+                ByVehicle::new(planners.collect(), any).ok_or_else(|| self.no_model())
             }
             Self::Policy => {
                 let source = models.outside_policy().ok_or(MethodError::NoPolicy)?;

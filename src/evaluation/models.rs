@@ -20,6 +20,8 @@ use crate::world::ParkingType;
 pub struct Models {
     /// In the order of their first files.
     vehicles: Vec<VehicleModels>,
+    /// Manoeuvres for vehicles that none of them serves.
+    fleet: Option<Arc<dyn PoseSelector>>,
     outside: Option<PolicySource>,
 }
 
@@ -96,8 +98,14 @@ impl Models {
     }
 
     fn add_selector(&mut self, model: Model) -> Result<(), ModelsError> {
-        let own = self.of_exactly(Origin::of(&model));
+        let Some(&vehicle) = model.vehicle() else {
+            self.fleet = Some(model.into_selector());
+            return Ok(());
+        };
+        let (path, training) = (model.path().to_owned(), model.training());
+        let own = self.of_exactly(Origin { path, training, vehicle });
         match model {
+            Model::Fleet(_) => unreachable!("it has no vehicle"),
             Model::Knn(knn) if own.knn.is_some() => {
                 return Err(ModelsError::TwoKnn(knn.path().to_owned()));
             }
@@ -154,6 +162,9 @@ impl Models {
             found.push(find_model("knn.bin"));
             found.extend(knn_of_other_vehicles());
         }
+        if needs(Method::N3p) {
+            found.push(find_model("fleet.safetensors"));
+        }
         if needs(Method::MlpN3p) {
             let network = |kind| find_model(format!("mlp-{kind}.safetensors"));
             found.extend(ParkingType::ALL.map(network));
@@ -176,10 +187,18 @@ impl Models {
         own.or_else(|| self.for_method(method).find(|m| m.vehicle().covers(vehicle)))
     }
 
+    /// The manoeuvres that `method` plans with for vehicles that no other model serves.
+    pub fn fleet(&self, method: Method) -> Option<Arc<dyn PoseSelector>> {
+        self.fleet.clone().filter(|_| method == Method::N3p)
+    }
+
     /// The selector that `method` plans with for `vehicle`; `None` where it needs none or has
     /// none.
     pub fn selector(&self, method: Method, vehicle: &Vehicle) -> Option<Arc<dyn PoseSelector>> {
-        self.serving(method, vehicle)?.selector(method)
+        match self.serving(method, vehicle) {
+            Some(models) => models.selector(method),
+            None => self.fleet(method),
+        }
     }
 
     /// The vehicle that the first model was trained for; `None` without models.
@@ -195,7 +214,7 @@ impl Models {
         vehicle: &Vehicle,
     ) -> Result<(), ModelsError> {
         let Some(any) = self.for_method(method).next() else { return Ok(()) };
-        if self.serving(method, vehicle).is_some() {
+        if self.serving(method, vehicle).is_some() || self.fleet(method).is_some() {
             return Ok(());
         }
         let Origin { path, training, vehicle: trained } = &any.origin;
@@ -260,9 +279,3 @@ impl VehicleModels {
     }
 }
 
-impl Origin {
-    fn of(model: &Model) -> Self {
-        let (path, vehicle) = (model.path().to_owned(), *model.vehicle());
-        Self { path, training: model.training(), vehicle }
-    }
-}

@@ -15,7 +15,7 @@ use super::courses::Course;
 use super::encoding::InputScale;
 use super::network::{Parameters, Role};
 use crate::selectors::artefact::{self, ArtefactError, Fault};
-use crate::selectors::tensor_file::{self, NamedTensor};
+use crate::selectors::tensor_file::{self, Content, NamedTensor};
 use crate::vehicle::Vehicle;
 
 /// The file name of a course's policy.
@@ -70,7 +70,7 @@ fn decode(bytes: &[u8]) -> Result<(PolicyHeader, Actor), Fault> {
     let shapes = Role::Actor.shapes();
     let values = shapes.values().map(|s| s.iter().product::<usize>() as u64).sum::<u64>();
     let (json, tensors) = tensor_file::decode(bytes, VERSION, 4 * values)?;
-    if !tensor_file::is_policy(&json) {
+    if Content::of(&json) != Content::Policy {
         return Err(Fault::Selector);
     }
     let damaged = |e: String| Fault::Header(e);

@@ -12,9 +12,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::PoseSelector;
+use super::fleet::FleetSelector;
 use super::knn::KnnSelector;
 use super::knn_file;
 use super::mlp::MlpSelector;
+use super::tensor_file::Content;
 use crate::files::{self, reason, write_whole};
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
@@ -130,6 +132,8 @@ pub enum Model {
     Knn(KnnSelector),
     /// A network of one parking type.
     Mlp(MlpSelector),
+    /// Manoeuvres for any vehicle.
+    Fleet(FleetSelector),
 }
 
 impl Model {
@@ -151,16 +155,23 @@ impl Model {
         // A safetensors file begins with the length of its header and a brace.
         let mut brace = [0u8; 1];
         match file.read_exact(&mut brace) {
-            Ok(()) if brace == *b"{" => Ok(Model::Mlp(MlpSelector::load(path)?)),
+            Ok(()) if brace == *b"{" => {
+                let bytes = std::fs::read(path).map_err(|e| Fault::Unreadable(e).of(path))?;
+                match Content::of_file(&bytes) {
+                    Content::Fleet => Ok(Model::Fleet(FleetSelector::from_bytes(path, &bytes)?)),
+                    Content::Mlp | Content::Policy => Ok(Model::Mlp(MlpSelector::load(path)?)),
+                }
+            }
             _ => Err(Fault::NotAModel.of(path)),
         }
     }
 
-    /// The vehicle the model was trained for.
-    pub fn vehicle(&self) -> &Vehicle {
+    /// The vehicle the model was trained for; `None` where it is for any.
+    pub fn vehicle(&self) -> Option<&Vehicle> {
         match self {
-            Model::Knn(m) => m.vehicle(),
-            Model::Mlp(m) => m.vehicle(),
+            Model::Knn(m) => Some(m.vehicle()),
+            Model::Mlp(m) => Some(m.vehicle()),
+            Model::Fleet(_) => None,
         }
     }
 
@@ -169,6 +180,7 @@ impl Model {
         match self {
             Model::Knn(m) => m.path(),
             Model::Mlp(m) => m.path(),
+            Model::Fleet(m) => m.path(),
         }
     }
 
@@ -177,6 +189,7 @@ impl Model {
         match self {
             Model::Knn(m) => m.kinds(),
             Model::Mlp(m) => m.kinds(),
+            Model::Fleet(m) => m.kinds(),
         }
     }
 
@@ -185,13 +198,15 @@ impl Model {
         let name = match self {
             Model::Knn(_) => "knn",
             Model::Mlp(_) => "mlp",
+            Model::Fleet(_) => "fleet",
         };
         selector_training(name, &self.kinds())
     }
 
     /// Refuses a model that was trained for another car; see [`check_vehicle`].
     pub fn check_vehicle(&self, wanted: &Vehicle) -> Result<(), ArtefactError> {
-        check_vehicle(self.path(), &self.training(), self.vehicle(), wanted)
+        let Some(vehicle) = self.vehicle() else { return Ok(()) };
+        check_vehicle(self.path(), &self.training(), vehicle, wanted)
     }
 
     /// The model as a selector that threads can share.
@@ -199,6 +214,7 @@ impl Model {
         match self {
             Model::Knn(m) => Arc::new(m),
             Model::Mlp(m) => Arc::new(m),
+            Model::Fleet(m) => Arc::new(m),
         }
     }
 }

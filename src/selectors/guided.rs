@@ -28,7 +28,7 @@ use super::{Features, PoseSelector};
 const LEG_EXPANSIONS: usize = 5_000;
 /// Expansions that `n3p` spends on the way to the preparatory poses before it searches for
 /// the goal itself.
-const APPROACH_EXPANSIONS: usize = 5_000;
+const APPROACH_EXPANSIONS: usize = 1_000;
 
 /// What `n3p` tries before it searches. The paper's rows have no such settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -125,7 +125,7 @@ impl GuidedPlanner {
         let fits = |(k, l): &(ParkingType, Library)| *k == kind && l.fits(problem);
         let at = self.libraries.iter().position(fits).unwrap_or_else(|| {
             let (manoeuvres, footprint) =
-                (self.selector.manoeuvres(kind), *problem.collision.footprint());
+                (self.selector.manoeuvres(kind, vehicle), *problem.collision.footprint());
             self.libraries.push((kind, Library::new(&manoeuvres, vehicle, footprint, cost)));
             self.libraries.len() - 1
         });

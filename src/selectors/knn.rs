@@ -223,7 +223,7 @@ impl PoseSelector for KnnSelector {
         }
     }
 
-    fn manoeuvres(&self, kind: ParkingType) -> Vec<Vec<Segment>> {
+    fn manoeuvres(&self, kind: ParkingType, _vehicle: &Vehicle) -> Vec<Vec<Segment>> {
         let kinds = &self.file.header().kinds;
         let Some(kind) = kinds.iter().position(|h| h.kind == kind) else { return Vec::new() };
         (0..kinds[kind].manoeuvres).map(|i| self.file.segments(kind, i).collect()).collect()

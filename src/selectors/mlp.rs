@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::artefact::{self, ArtefactError, Fault};
 use super::network::{self, LAYERS, LayerWeights, Network, OUTPUTS};
-use super::tensor_file::{self, NamedTensor};
+use super::tensor_file::{self, Content, NamedTensor};
 use super::{Features, Normaliser, PoseSelector};
 use crate::geometry::Pose;
 use crate::vehicle::Vehicle;
@@ -172,7 +172,7 @@ impl PoseSelector for MlpSelector {
 
 fn decode(bytes: &[u8]) -> Result<(MlpHeader, Vec<LayerWeights>), Fault> {
     let (json, tensors) = tensor_file::decode(bytes, VERSION, parameter_bytes())?;
-    if tensor_file::is_policy(&json) {
+    if Content::of(&json) == Content::Policy {
         return Err(Fault::Policy);
     }
     let header: MlpHeader =

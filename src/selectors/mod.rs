@@ -7,6 +7,7 @@
 
 pub mod artefact;
 mod features;
+pub mod fleet;
 pub mod guided;
 pub mod knn;
 pub mod knn_file;
@@ -20,6 +21,7 @@ pub use normaliser::Normaliser;
 
 use crate::curves::Segment;
 use crate::geometry::Pose;
+use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
 use crate::world::cell::Grid;
 
@@ -30,8 +32,8 @@ pub trait PoseSelector: Send + Sync {
     fn select(&self, features: &Features, k: usize, out: &mut Vec<Pose>);
 
     /// The manoeuvres it knows for spots of a type: motions in driving order that end at the
-    /// parked pose. None by default.
-    fn manoeuvres(&self, _kind: ParkingType) -> Vec<Vec<Segment>> {
+    /// parked pose, drivable by `vehicle`. None by default.
+    fn manoeuvres(&self, _kind: ParkingType, _vehicle: &Vehicle) -> Vec<Vec<Segment>> {
         Vec::new()
     }
 

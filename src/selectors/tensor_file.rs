@@ -128,14 +128,37 @@ fn split_entry(entry: &str) -> Option<(&str, &str)> {
     Some((sum, header.strip_suffix('}')?))
 }
 
-/// Whether a header is that of a policy.
-pub fn is_policy(header: &str) -> bool {
-    #[derive(Deserialize)]
-    struct Policy {
-        #[serde(rename = "course")]
-        _course: serde::de::IgnoredAny,
+/// The kinds of model that are stored this way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Content {
+    /// A network that predicts preparatory poses.
+    Mlp,
+    /// A driving policy.
+    Policy,
+    /// Manoeuvres for any vehicle.
+    Fleet,
+}
+
+impl Content {
+    /// What a header is the header of.
+    pub fn of(header: &str) -> Self {
+        let has = |key| {
+            let parsed: Result<serde_json::Value, _> = serde_json::from_str(header);
+            parsed.is_ok_and(|h| h.get(key).is_some())
+        };
+        match () {
+            () if has("course") => Self::Policy,
+            () if has("fleet") => Self::Fleet,
+            () => Self::Mlp,
+        }
     }
-    serde_json::from_str::<Policy>(header).is_ok()
+
+    /// What a file holds; [`Content::Mlp`] where that cannot be told.
+    pub fn of_file(bytes: &[u8]) -> Self {
+        let entry = metadata(bytes, 0).ok();
+        let header = entry.as_ref().and_then(|(_, entry)| split_entry(entry));
+        header.map_or(Self::Mlp, |(_, header)| Self::of(header))
+    }
 }
 
 /// The finite values of a tensor of single precision and this shape.

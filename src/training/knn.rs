@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 pub use super::leave_one_out::LeaveOneOut;
 use super::leave_one_out::leave_one_out;
-use super::{TrainingError, card, library, solved, write_beside};
+use super::library::{self, Source};
+use super::{TrainingError, card, solved, write_beside};
 use crate::dataset::{Metadata, Sample, content_sha256};
 use crate::geometry::Pose;
 use crate::selectors::artefact;
@@ -69,7 +70,7 @@ pub fn train(
     let heading_radius = metadata.vehicle.turning_radius() / 2.0;
     let learnt: Vec<_> = std::thread::scope(|scope| {
         let learn = |(kind, solved): &(ParkingType, Vec<&Sample>)| {
-            let manoeuvres = library::condense(metadata, *kind, solved);
+            let manoeuvres = library::condense(*kind, &[Source { metadata, solved, unit: 1.0 }]);
             (manoeuvres, leave_one_out(metadata, solved, heading_radius))
         };
         let running: Vec<_> = known.iter().map(|k| scope.spawn(move || learn(k))).collect();

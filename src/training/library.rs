@@ -12,6 +12,7 @@ use crate::geometry::{Aabb, Pose};
 use crate::planners::hybrid_astar::GoalSet;
 use crate::planners::library::{Library, LibrarySearch, Verdicts};
 use crate::planners::{HybridAStar, Problem};
+use crate::selectors::fleet::scaled;
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
 use crate::world::collision::BodyFrame;
@@ -27,49 +28,76 @@ const MOST_TRIES_PER_USE: usize = 20;
 /// are taken.
 const MOST_SAMPLES: usize = 10_000;
 
-/// Manoeuvres for spots of type `kind` from its `solved` samples, which are ordered by cell.
-pub(super) fn condense(
-    metadata: &Metadata,
-    kind: ParkingType,
-    solved: &[&Sample],
-) -> Vec<Vec<Segment>> {
-    let Metadata { vehicle, planner, .. } = metadata;
-    let mut hars = HybridAStar::new(*planner);
+/// Solved samples of one vehicle and parking type, ordered by cell.
+pub(super) struct Source<'a> {
+    /// Of the data set they belong to.
+    pub metadata: &'a Metadata,
+    /// The samples.
+    pub solved: &'a [&'a Sample],
+    /// Metres per unit of length of the manoeuvres: 1, or the vehicle's turning radius where they
+    /// are to serve other vehicles, too.
+    pub unit: f64,
+}
+
+impl Source<'_> {
+    /// The library of `manoeuvres` for this vehicle.
+    fn library(&self, manoeuvres: &[Vec<Segment>]) -> Library {
+        let Metadata { vehicle, planner, .. } = self.metadata;
+        let own: Vec<_> = manoeuvres.iter().map(|m| scaled(m, self.unit)).collect();
+        Library::new(&own, vehicle, vehicle.footprint(Problem::MARGIN), &planner.cost)
+    }
+}
+
+/// Manoeuvres for spots of type `kind` that serve all `sources`, in their units.
+pub(super) fn condense(kind: ParkingType, sources: &[Source]) -> Vec<Vec<Segment>> {
     let mut search = LibrarySearch::default();
-    let mut library = Library::new(&[], vehicle, vehicle.footprint(Problem::MARGIN), &planner.cost);
     let mut manoeuvres = Vec::new();
-    let taken = spread(solved, metadata.manoeuvres_per_cell);
-    let mut cells = Vec::new();
-    for_each_cell(metadata, kind, &taken, |problem, samples| {
-        let mut verdicts = Verdicts::default();
-        for sample in samples {
-            problem.start = sample.start;
-            let Some((manoeuvre, cost)) = ending(&mut hars, metadata, sample, problem) else {
-                continue;
-            };
-            let bound = cost + TOLERANCE;
-            let known = search.plan_again(&library, &mut verdicts, problem, &planner.cost, bound);
-            if known.is_none() {
-                library.add(manoeuvre.clone(), &planner.cost);
-                manoeuvres.push(manoeuvre);
+    let mut verdicts_of = Vec::new();
+    for source in sources {
+        let Metadata { planner, manoeuvres_per_cell, .. } = source.metadata;
+        let mut hars = HybridAStar::new(*planner);
+        let mut library = source.library(&manoeuvres);
+        let taken = spread(source.solved, *manoeuvres_per_cell);
+        let mut cells = Vec::new();
+        for_each_cell(source.metadata, kind, &taken, |problem, samples| {
+            let mut verdicts = Verdicts::default();
+            for sample in samples {
+                problem.start = sample.start;
+                let Some((manoeuvre, cost)) = ending(&mut hars, source.metadata, sample, problem)
+                else {
+                    continue;
+                };
+                let bound = cost + TOLERANCE;
+                let known =
+                    search.plan_again(&library, &mut verdicts, problem, &planner.cost, bound);
+                if known.is_none() {
+                    manoeuvres.push(scaled(&manoeuvre, 1.0 / source.unit));
+                    library.add(manoeuvre, &planner.cost);
+                }
             }
-        }
-        cells.push(verdicts);
-    });
-    let mut cells = cells.into_iter();
+            cells.push(verdicts);
+        });
+        verdicts_of.push(cells);
+    }
     let mut records = vec![Record::default(); manoeuvres.len()];
-    for_each_cell(metadata, kind, &taken, |problem, samples| {
-        let mut verdicts = cells.next().expect("the same cells");
-        for sample in samples {
-            problem.start = sample.start;
-            let any = f64::INFINITY;
-            let plan = search.plan_again(&library, &mut verdicts, problem, &planner.cost, any);
-            if let Some(plan) = plan {
-                records[plan.manoeuvre].uses += 1;
-                search.tried().for_each(|i| records[i].tries += 1);
+    for (source, cells) in sources.iter().zip(verdicts_of) {
+        let Metadata { planner, manoeuvres_per_cell, .. } = source.metadata;
+        let library = source.library(&manoeuvres);
+        let taken = spread(source.solved, *manoeuvres_per_cell);
+        let mut cells = cells.into_iter();
+        for_each_cell(source.metadata, kind, &taken, |problem, samples| {
+            let mut verdicts = cells.next().expect("the same cells");
+            for sample in samples {
+                problem.start = sample.start;
+                let any = f64::INFINITY;
+                let plan = search.plan_again(&library, &mut verdicts, problem, &planner.cost, any);
+                if let Some(plan) = plan {
+                    records[plan.manoeuvre].uses += 1;
+                    search.tried().for_each(|i| records[i].tries += 1);
+                }
             }
-        }
-    });
+        });
+    }
     let mut records = records.into_iter();
     manoeuvres.retain(|_| records.next().is_some_and(|r| r.is_worth_it()));
     manoeuvres

@@ -8,6 +8,7 @@
 
 mod card;
 pub mod curve;
+pub mod fleet;
 pub mod knn;
 mod leave_one_out;
 pub mod library;

@@ -3,12 +3,14 @@
 //! A card says nothing of the day, the machine or the build, so that the same data, settings and
 //! seed give the same bytes. Programs read the log instead ([`super::log_path`]).
 
+mod fleet;
 mod knn;
 mod mlp;
 
 use std::fmt::Write;
 use std::path::Path;
 
+pub(super) use fleet::fleet;
 pub(super) use knn::knn;
 pub(super) use mlp::mlp;
 
