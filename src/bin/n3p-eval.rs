@@ -27,7 +27,7 @@ struct Args {
     #[arg(long, value_name = "FILE|COMMAND")]
     policy: Option<String>,
     /// Seconds that the program of --policy may take for an answer.
-    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, requires = "policy", value_parser = cli::seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, requires = "policy", value_parser = cli::seconds, allow_negative_numbers = true)]
     policy_limit: f64,
     /// Parking type [default: all that the models know].
     #[arg(long = "type", value_enum, value_name = "TYPE")]

@@ -37,7 +37,7 @@ struct Args {
     #[arg(long, value_name = "FILE|COMMAND")]
     policy: Option<String>,
     /// Seconds that the program of --policy may take for an answer.
-    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, requires = "policy", value_parser = cli::seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, requires = "policy", value_parser = cli::seconds, allow_negative_numbers = true)]
     policy_limit: f64,
     /// Write the path to this JSON file.
     #[arg(long, value_name = "FILE")]

@@ -77,6 +77,7 @@ pub fn train(
     if trainer.log.points.last().is_none_or(|p| p.episodes < trainer.episodes) {
         trainer.report(out)?;
     }
+    write_beside(out, &trainer.log, card::card(out, &trainer.log))?;
     let picture = curve::svg(&trainer.log)?;
     artefact::write(&out.with_extension("training.svg"), picture.as_bytes())?;
     Ok(trainer.log)
