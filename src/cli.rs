@@ -5,6 +5,7 @@
 
 use std::fmt::Display;
 use std::io::{self, Write};
+use std::ops::RangeInclusive;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
@@ -71,6 +72,13 @@ pub fn seconds(text: &str) -> Result<f64, String> {
     let seconds: f64 = text.parse().map_err(|_| expected.to_owned())?;
     let fine = seconds > 0.0 && seconds <= 86_400.0;
     fine.then_some(seconds).ok_or_else(|| expected.to_owned())
+}
+
+/// Parses a number within `range`, in `unit`.
+pub fn within(text: &str, range: RangeInclusive<f64>, unit: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|n| range.contains(n));
+    let (low, high) = (range.start(), range.end());
+    number.ok_or_else(|| format!("expected a number between {low} and {high} {unit}"))
 }
 
 /// Runs a binary's body and maps its error to stderr and an exit code.

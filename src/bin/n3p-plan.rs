@@ -7,9 +7,12 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput};
+use n3p::curves::TrajectoryLimits;
+use n3p::curves::trajectory::TrajectoryReport;
 use n3p::evaluation::draw::{Drawing, scene_svg};
 use n3p::evaluation::{
-    Case, Episode, EpisodeConfig, Method, MethodSettings, Models, SpotReport, episode, trace,
+    Case, Episode, EpisodeConfig, Method, MethodSettings, Models, SpotReport, TrajectoryFile,
+    episode, trace,
 };
 use n3p::files::{check_writable, reason, write_whole};
 use n3p::planners::Problem;
@@ -45,12 +48,57 @@ struct Args {
     /// Draw scene and path to this SVG file.
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
+    /// Write the trajectory, the path in time, to this .csv or .json file.
+    #[arg(long, value_name = "FILE", value_parser = TrajectoryFile::file_name)]
+    trajectory: Option<PathBuf>,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
     /// Expansion budget.
     #[arg(long, default_value_t = 200_000, value_name = "N")]
     max_expansions: usize,
+    #[command(flatten)]
+    limits: Limits,
+}
+
+/// Limits of the trajectory; those of speed are the scene's.
+#[derive(clap::Args)]
+#[command(next_help_heading = "With --trajectory")]
+#[group(requires = "trajectory")]
+struct Limits {
+    /// Largest acceleration and braking, m/s².
+    #[arg(long, value_name = "M/S2", value_parser = acceleration, allow_negative_numbers = true)]
+    #[arg(default_value_t = TrajectoryLimits::default().forward_acceleration)]
+    acceleration: f64,
+    /// The same in backward gear [default: as --acceleration].
+    #[arg(long, value_name = "M/S2", value_parser = acceleration, allow_negative_numbers = true)]
+    backward_acceleration: Option<f64>,
+    /// How fast the front wheels turn, rad/s.
+    #[arg(long, value_name = "RAD/S", value_parser = steer_rate, allow_negative_numbers = true)]
+    #[arg(default_value_t = TrajectoryLimits::default().steer_rate)]
+    steer_rate: f64,
+    /// Stop wherever the steering angle jumps, and turn the wheels there.
+    #[arg(long)]
+    stop_to_steer: bool,
+}
+
+fn acceleration(text: &str) -> std::result::Result<f64, String> {
+    cli::within(text, TrajectoryLimits::ACCELERATIONS, "m/s²")
+}
+
+fn steer_rate(text: &str) -> std::result::Result<f64, String> {
+    cli::within(text, TrajectoryLimits::STEER_RATES, "rad/s")
+}
+
+impl Limits {
+    fn settings(&self) -> TrajectoryLimits {
+        TrajectoryLimits {
+            forward_acceleration: self.acceleration,
+            backward_acceleration: self.backward_acceleration.unwrap_or(self.acceleration),
+            steer_rate: self.steer_rate,
+            stop_to_steer: self.stop_to_steer,
+        }
+    }
 }
 
 fn main() -> ExitCode {
@@ -67,7 +115,7 @@ fn plan(args: &Args) -> Result<ExitCode> {
             format!("{}: cannot be written: {}; choose another file", path.display(), reason(&e));
         anyhow::Error::from(BadInput(text))
     };
-    for path in args.out.iter().chain(&args.svg) {
+    for path in args.out.iter().chain(&args.svg).chain(&args.trajectory) {
         check_writable(path).map_err(|e| unwritable(path, e))?;
     }
     let (method, models) = choose(args, &scene, &problem)?;
@@ -84,16 +132,29 @@ fn plan(args: &Args) -> Result<ExitCode> {
         let picture = picture(&case.scene, &episode, method, &models);
         write_whole(svg, picture.as_bytes()).map_err(|e| unwritable(svg, e))?;
     }
+    // Nobody should drive a path that the independent check refuses.
+    let trajectory = match (&args.trajectory, &episode.result.outcome) {
+        (Some(file), Ok(path)) if episode.row.ok => {
+            let (frame, limits) = (&episode.problem.frame, args.limits.settings());
+            let made = TrajectoryFile::new(&case.scene, frame, path, method.name(), limits)?;
+            made.write(file).map_err(|e| unwritable(file, e))?;
+            Some(made.report)
+        }
+        _ => None,
+    };
     if args.json {
         let (row, path) = (&episode.row, &episode.path);
         let spot = SpotReport::new(&episode, &models);
-        let result = serde_json::json!({"row": row, "path": path, "spot": spot});
+        let mut result = serde_json::json!({"row": row, "path": path, "spot": spot});
+        if let Some(report) = &trajectory {
+            result["trajectory"] = serde_json::json!(report);
+        }
         cli::print(result)?;
     } else {
-        cli::print(summary(&episode))?;
-        if let Some(spot) = SpotReport::new(&episode, &models) {
-            cli::print(spot)?;
-        }
+        let spot = SpotReport::new(&episode, &models).map(|s| format!("
+{s}"));
+        let time = trajectory.as_ref().map(in_time);
+        cli::print(summary(&episode) + &spot.unwrap_or_default() + &time.unwrap_or_default())?;
     }
     match (&episode.path, episode.row.ok) {
         (None, _) => Ok(ExitCode::from(cli::EXIT_NO_PATH)),
@@ -156,6 +217,19 @@ fn summary(episode: &Episode) -> String {
         lines.push(format!("  route             {}", guidance.route.explanation()));
     }
     lines.join("\n")
+}
+
+/// What the trajectory takes, as lines of the summary.
+fn in_time(report: &TrajectoryReport) -> String {
+    let (time, standing) = (report.duration_s, report.standing_s);
+    let jumps = match report.steer_jumps.len() {
+        0 => "none".to_owned(),
+        n => format!("{n}, up to {:.2} rad (none with --stop-to-steer)", report.max_steer_jump_rad),
+    };
+    format!(
+        "\n  driving time      {time:.2} s, {standing:.2} s of it at standstill\n  \
+         steering jumps    {jumps}"
+    )
 }
 
 /// The scene, and over it the path and what N3P made of the spot.

@@ -57,16 +57,15 @@ impl PathFile {
 
     /// The export of `path`, planned in `frame` for `scene`.
     pub fn new(scene: &Scene, frame: &Frame, path: &Path, method: &str) -> Self {
-        let samples = path.to_world(frame).sample(Self::STEP);
-        let mut poses: Vec<[f64; 3]> = samples.iter().map(|s| s.pose.into()).collect();
-        if let Some(first) = poses.first_mut() {
-            snap(first, scene.start);
+        let mut samples = path.to_world(frame).sample(Self::STEP);
+        if let Some(first) = samples.first_mut() {
+            first.pose = snap(first.pose, scene.start);
         }
-        if let Some(last) = poses.last_mut() {
-            snap(last, scene.goal);
+        if let Some(last) = samples.last_mut() {
+            last.pose = snap(last.pose, scene.goal);
         }
         Self {
-            poses,
+            poses: samples.iter().map(|s| s.pose.into()).collect(),
             gears: samples.iter().map(|s| s.gear.sign() as i8).collect(),
             steer: samples.iter().map(|s| scene.vehicle.steer(s.curvature)).collect(),
             method: method.to_owned(),
@@ -102,12 +101,10 @@ impl PathFile {
     }
 }
 
-fn snap(pose: &mut [f64; 3], exact: Pose) {
-    let p = Pose::from(*pose);
-    let near = PathFile::SNAP;
-    if p.distance(exact) <= near && signed_angle(p.heading, exact.heading).abs() <= near {
-        *pose = exact.into();
-    }
+/// `exact`, where `pose` is as near as rounding leaves it; else `pose`.
+pub(super) fn snap(pose: Pose, exact: Pose) -> Pose {
+    let turn = signed_angle(pose.heading, exact.heading).abs();
+    if pose.distance(exact).max(turn) <= PathFile::SNAP { exact } else { pose }
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@
 //! [`oracle`]; [`suite`] does so for all; [`rows`] are saved; [`metrics`] summarises them,
 //! [`table`] lays them out beside the paper's, [`report`] writes them down, and [`html`] with
 //! plots and a gallery of the paths that [`trace`] kept. [`draw`] makes pictures of scenes and
-//! paths. [`learning_curve`] is what experiments add: how much data is enough.
+//! paths, [`trajectory_file`] puts a path in time. [`learning_curve`] is what experiments add: how much data is enough.
 
 pub mod draw;
 pub mod by_vehicle;
@@ -24,6 +24,7 @@ pub mod spot_report;
 pub mod suite;
 pub mod table;
 pub mod trace;
+pub mod trajectory_file;
 
 pub use episode::{Case, Episode, EpisodeConfig};
 pub use export::{PathFile, PathFileError};
@@ -34,3 +35,4 @@ pub use outputs::{OutputError, Outputs};
 pub use rows::Row;
 pub use spot_report::SpotReport;
 pub use suite::{SuiteConfig, SuiteError};
+pub use trajectory_file::TrajectoryFile;

@@ -170,6 +170,11 @@ impl Vehicle {
         (curvature * self.wheelbase).atan()
     }
 
+    /// Curvature driven with the steering angle `steer`, 1/m.
+    pub fn curvature(&self, steer: f64) -> f64 {
+        steer.tan() / self.wheelbase
+    }
+
     /// Rear axle to front bumper, metres.
     pub fn front_extent(&self) -> f64 {
         self.length - self.rear_overhang

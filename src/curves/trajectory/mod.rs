@@ -1,0 +1,266 @@
+//! A trajectory: a path in time, with speed and steering at every moment.
+//!
+//! A path is cut into *runs*, which the car drives from standstill to standstill: at each gear
+//! change, and with [`TrajectoryLimits::stop_to_steer`] also wherever the steering angle jumps.
+//! On a run the speed rises at the acceleration limit to the vehicle's speed in that gear, stays
+//! there, and falls as it rose: the fastest way within these limits. Before each run the wheels
+//! turn, at the steering rate and at standstill, to where the run needs them; before the first
+//! they are straight.
+//!
+//! Where two arcs meet, the curvature of a path jumps. To stay on the path and within the
+//! steering rate a car has to stop there. Without `stop_to_steer` it drives on, and the
+//! [`TrajectoryReport`] lists every jump.
+
+mod limits;
+mod phase;
+mod profile;
+mod report;
+
+pub use limits::{LimitError, TrajectoryLimits};
+pub use phase::Moment;
+pub use report::{SteerJump, TrajectoryReport};
+
+use phase::Phase;
+use profile::Profile;
+
+use super::{Path, Segment};
+use crate::geometry::{Pose, wrap_angle};
+use crate::vehicle::{Gear, Vehicle};
+
+/// A path in time.
+///
+/// Made of phases: in each the acceleration is constant, and the steering angle too, or the
+/// car stands and the wheels turn steadily. So everything is known exactly at any time.
+#[derive(Clone, Debug)]
+pub struct Trajectory {
+    vehicle: Vehicle,
+    phases: Vec<Phase>,
+    jumps: Vec<SteerJump>,
+    /// How often the car starts to drive.
+    runs: usize,
+    end: Moment,
+}
+
+/// Lengths and angles below this are none, metres and radians.
+const TINY: f64 = 1e-10;
+
+impl Trajectory {
+    /// Smaller jumps of the steering angle, radians, are driven over and not reported.
+    pub const STEER_TOLERANCE: f64 = 1e-4;
+
+    /// Drives `path` with `vehicle` within `limits`.
+    pub fn new(
+        path: &Path,
+        vehicle: &Vehicle,
+        limits: &TrajectoryLimits,
+    ) -> Result<Self, LimitError> {
+        limits.validate()?;
+        // Joins what needs no joint, and drops motions of no length.
+        let path = Path::new(path.start, path.segments.iter().copied());
+        let legs: Vec<_> = path.legs().collect();
+        let end = Moment {
+            time: 0.0,
+            pose: Pose { heading: wrap_angle(path.start.heading), ..path.start },
+            speed: 0.0,
+            acceleration: 0.0,
+            steer: 0.0,
+            curvature: 0.0,
+            distance: 0.0,
+            gear: Gear::Forward,
+        };
+        let mut made = Self { vehicle: *vehicle, phases: vec![], jumps: vec![], runs: 0, end };
+        let goes_on = |(_, a): &(Pose, Segment), (_, b): &(Pose, Segment)| {
+            let jump = vehicle.steer(b.curvature) - vehicle.steer(a.curvature);
+            let smooth = jump.abs() <= Self::STEER_TOLERANCE;
+            a.gear() == b.gear() && (smooth || !limits.stop_to_steer)
+        };
+        for run in legs.chunk_by(goes_on) {
+            made.turn_wheels(run[0], limits);
+            made.drive(run, limits);
+        }
+        Ok(made)
+    }
+
+    /// Turns the wheels at standstill to where `leg` needs them.
+    fn turn_wheels(&mut self, (from, segment): (Pose, Segment), limits: &TrajectoryLimits) {
+        let turn = self.vehicle.steer(segment.curvature) - self.end.steer;
+        if turn.abs() <= TINY {
+            return;
+        }
+        self.phases.push(Phase {
+            time: self.end.time,
+            distance: self.end.distance,
+            speed: 0.0,
+            acceleration: 0.0,
+            steer: self.end.steer,
+            steer_rate: turn.signum() * limits.steer_rate,
+            segment,
+            from,
+            along: 0.0,
+        });
+        self.end.time += turn.abs() / limits.steer_rate;
+    }
+
+    /// Drives `legs`, all in one gear, from standstill to standstill.
+    fn drive(&mut self, legs: &[(Pose, Segment)], limits: &TrajectoryLimits) {
+        let gear = legs[0].1.gear();
+        let length = legs.iter().map(|(_, s)| s.length.abs()).sum();
+        let profile = Profile::new(length, self.vehicle.speed(gear), limits.acceleration(gear));
+        let (start_time, start_distance) = (self.end.time, self.end.distance);
+        let mut leg_begins = 0.0;
+        for (i, &(from, segment)) in legs.iter().enumerate() {
+            let steer = self.vehicle.steer(segment.curvature);
+            let jump = SteerJump {
+                time_s: start_time + profile.time(leg_begins),
+                distance_m: start_distance + leg_begins,
+                from_rad: self.end.steer,
+                to_rad: steer,
+                dwell_s: (steer - self.end.steer).abs() / limits.steer_rate,
+            };
+            if i > 0 && jump.size() > Self::STEER_TOLERANCE {
+                self.jumps.push(jump);
+            }
+            let leg_ends = leg_begins + segment.length.abs();
+            let mut begins = leg_begins;
+            for ends in profile.changes().into_iter().chain([leg_ends]) {
+                if ends - begins <= TINY || (ends != leg_ends && leg_ends - ends <= TINY) {
+                    continue;
+                }
+                self.phases.push(Phase {
+                    time: start_time + profile.time(begins),
+                    distance: start_distance + begins,
+                    speed: profile.speed(begins),
+                    acceleration: profile.acceleration(0.5 * (begins + ends)),
+                    steer,
+                    steer_rate: 0.0,
+                    segment,
+                    from,
+                    along: begins - leg_begins,
+                });
+                begins = ends;
+            }
+            leg_begins = leg_ends;
+            self.end.steer = steer;
+        }
+        let (from, last) = legs[legs.len() - 1];
+        let pose = last.end(from);
+        self.runs += 1;
+        self.end = Moment {
+            time: start_time + profile.duration(),
+            pose: Pose::new(pose.x, pose.y, wrap_angle(pose.heading)),
+            curvature: self.vehicle.curvature(self.end.steer),
+            distance: start_distance + length,
+            gear,
+            ..self.end
+        };
+    }
+
+    /// The moment of arrival. For a path of no length it is the start.
+    pub fn end(&self) -> Moment {
+        self.end
+    }
+
+    /// The state `time` seconds after the start; before it and after the end the car stands.
+    pub fn at(&self, time: f64) -> Moment {
+        let time = time.max(0.0);
+        let begun = self.phases.partition_point(|p| p.time <= time);
+        match self.phases[..begun].last() {
+            Some(phase) if time < self.end.time => phase.at(time, &self.vehicle),
+            _ => Moment { time: time.max(self.end.time), ..self.end },
+        }
+    }
+
+    /// Moments every `step` seconds, start and end, and every moment at which acceleration,
+    /// steering angle or its rate changes. So between two of them all three are constant while
+    /// the car drives, and at standstill the wheels turn steadily.
+    ///
+    /// A multiple of `step` is left out where it would be nearer than 2 % of a step to another
+    /// kind of moment. `step` must be positive.
+    pub fn sample(&self, step: f64) -> Vec<Moment> {
+        let changes: Vec<f64> = self.phases.iter().map(|p| p.time).chain([self.end.time]).collect();
+        let is_apart = |time: f64| {
+            let after = changes.partition_point(|&c| c <= time);
+            changes[after.saturating_sub(1)..changes.len().min(after + 1)]
+                .iter()
+                .all(|c| (c - time).abs() >= 0.02 * step)
+        };
+        // Divided, not multiplied: the third moment at 0.05 s is 0.15, not 0.15000000000000002.
+        let per_second = 1.0 / step;
+        let grid = (1..).map(|i| f64::from(i) / per_second).take_while(|&t| t < self.end.time);
+        let mut times: Vec<f64> = grid.filter(|&t| is_apart(t)).collect();
+        times.extend(&changes);
+        times.sort_by(f64::total_cmp);
+        times.into_iter().map(|t| self.at(t)).collect()
+    }
+
+    /// Extremes and steering jumps.
+    pub fn report(&self) -> TrajectoryReport {
+        TrajectoryReport::of(self)
+    }
+
+    fn phases_with_durations(&self) -> impl Iterator<Item = (&Phase, f64)> {
+        let ends = self.phases.iter().skip(1).map(|p| p.time).chain([self.end.time]);
+        self.phases.iter().zip(ends).map(|(phase, end)| (phase, end - phase.time))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drive(segments: &[(f64, f64)], stop_to_steer: bool) -> Trajectory {
+        let segments = segments.iter().map(|&(curvature, length)| Segment { curvature, length });
+        let path = Path::new(Pose::new(1.0, 2.0, 0.3), segments);
+        let limits = TrajectoryLimits { stop_to_steer, ..Default::default() };
+        Trajectory::new(&path, &Vehicle::default(), &limits).unwrap()
+    }
+
+    #[test]
+    fn one_straight_takes_the_time_of_the_textbook() {
+        let t = drive(&[(0.0, 10.0)], false);
+        assert!((t.end().time - 7.0).abs() < 1e-12, "{:?}", t.end());
+        let middle = t.at(3.5);
+        assert!((middle.distance - 5.0).abs() < 1e-12 && middle.speed == 2.0, "{middle:?}");
+        let back = drive(&[(0.0, -10.0)], false);
+        assert!((back.end().time - 11.0).abs() < 1e-12, "{:?}", back.end());
+        assert_eq!(back.at(5.5).speed, -1.0);
+        assert!(back.at(0.5).acceleration < 0.0, "backward, speeding up lowers the speed");
+    }
+
+    #[test]
+    fn a_path_of_no_length_is_one_moment() {
+        let t = drive(&[], false);
+        let moments = t.sample(0.05);
+        assert_eq!(moments, [t.end()]);
+        assert_eq!((moments[0].time, moments[0].pose), (0.0, Pose::new(1.0, 2.0, 0.3)));
+        assert_eq!(t.report().duration_s, 0.0);
+    }
+
+    #[test]
+    fn wheels_turn_at_standstill_and_jumps_are_reported() {
+        let left = (0.2 * Vehicle::default().wheelbase).atan();
+        let segments = [(0.2, 3.0), (-0.2, 3.0), (0.2, -2.0)];
+        let t = drive(&segments, false);
+        let r = t.report();
+        assert_eq!((r.stops, r.steer_jumps.len(), r.steer_rate_kept), (1, 1, false));
+        assert!((r.max_steer_jump_rad - 2.0 * left).abs() < 1e-12);
+        assert!((r.steer_jump_dwell_s - 2.0 * left / 0.6).abs() < 1e-12);
+        assert!((r.steer_jumps[0].distance_m - 3.0).abs() < 1e-12);
+        // From straight to the left, and at the gear change from right to left.
+        assert!((r.standing_s - 3.0 * left / 0.6).abs() < 1e-9);
+        assert!((t.at(r.steer_jumps[0].time_s).steer + left).abs() < 1e-12);
+
+        let stopping = drive(&segments, true).report();
+        assert_eq!((stopping.stops, stopping.steer_jumps.len()), (2, 0));
+        assert!(stopping.steer_rate_kept && stopping.duration_s > r.duration_s);
+        assert!((stopping.standing_s - 5.0 * left / 0.6).abs() < 1e-9);
+        assert_eq!(stopping.max_backward_speed_mps, 1.0);
+        assert!((stopping.max_forward_speed_mps - 3.0_f64.sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn differences_of_no_account_are_driven_over() {
+        let t = drive(&[(0.1, 2.0), (0.1 + 1e-6, 2.0)], true);
+        assert_eq!((t.report().stops, t.report().steer_jumps.len()), (0, 0));
+    }
+}
