@@ -11,6 +11,7 @@ use clap::error::ErrorKind;
 use tracing_subscriber::EnvFilter;
 
 use crate::files::reason;
+use crate::planners::Problem;
 
 /// Exit code of a planner that found no path.
 pub const EXIT_NO_PATH: u8 = 3;
@@ -71,6 +72,14 @@ pub fn seconds(text: &str) -> Result<f64, String> {
     let seconds: f64 = text.parse().map_err(|_| expected.to_owned())?;
     let fine = seconds > 0.0 && seconds <= 86_400.0;
     fine.then_some(seconds).ok_or_else(|| expected.to_owned())
+}
+
+/// Parses the metres of `--margin`: from 0 to [`Problem::MAX_MARGIN`].
+pub fn margin(text: &str) -> Result<f64, String> {
+    let expected = format!("expected a number of metres from 0 to {}", Problem::MAX_MARGIN);
+    let metres: f64 = text.parse().map_err(|_| expected.clone())?;
+    let fine = (0.0..=Problem::MAX_MARGIN).contains(&metres);
+    fine.then_some(metres).ok_or(expected)
 }
 
 /// Runs a binary's body and maps its error to stderr and an exit code.
