@@ -8,6 +8,7 @@ mod common;
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use n3p::vehicle::Vehicle;
 use n3p::evaluation::{Method, Models};
 use n3p::world::ParkingType;
 
@@ -15,8 +16,8 @@ fn bench(c: &mut Criterion) {
     let problems: Vec<_> =
         ParkingType::ALL.iter().flat_map(|&kind| common::problems_of(kind, 20)).collect();
     let selector = |method| {
-        let models = Models::usual(method).expect("the models of the repository load");
-        models.selector(method).expect("models/ holds a model for the method")
+        let models = Models::usual(&[method]).expect("the models of the repository load");
+        models.selector(method, &Vehicle::default()).expect("models/ holds a model for the method")
     };
     let (knn, mlp) = (selector(Method::KnnN3p), selector(Method::MlpN3p));
     let mut group = c.benchmark_group("selectors");

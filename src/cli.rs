@@ -12,6 +12,7 @@ use clap::error::ErrorKind;
 use tracing_subscriber::EnvFilter;
 
 use crate::files::reason;
+use crate::planners::Problem;
 
 /// Exit code of a planner that found no path.
 pub const EXIT_NO_PATH: u8 = 3;
@@ -66,12 +67,9 @@ pub fn print(text: impl Display) -> anyhow::Result<()> {
     }
 }
 
-/// Parses a positive, finite number of seconds, at most a day.
+/// Parses a time limit: a millisecond to a day, in seconds.
 pub fn seconds(text: &str) -> Result<f64, String> {
-    let expected = "expected a number of seconds above 0 and up to 86400";
-    let seconds: f64 = text.parse().map_err(|_| expected.to_owned())?;
-    let fine = seconds > 0.0 && seconds <= 86_400.0;
-    fine.then_some(seconds).ok_or_else(|| expected.to_owned())
+    within(text, 1e-3..=86_400.0, "seconds")
 }
 
 /// Parses a number within `range`, in `unit`.
@@ -79,6 +77,11 @@ pub fn within(text: &str, range: RangeInclusive<f64>, unit: &str) -> Result<f64,
     let number = text.parse().ok().filter(|n| range.contains(n));
     let (low, high) = (range.start(), range.end());
     number.ok_or_else(|| format!("expected a number between {low} and {high} {unit}"))
+}
+
+/// Parses the metres of `--margin`.
+pub fn margin(text: &str) -> Result<f64, String> {
+    within(text, 0.0..=Problem::MAX_MARGIN, "metres")
 }
 
 /// Runs a binary's body and maps its error to stderr and an exit code.

@@ -33,6 +33,8 @@ pub enum Stream {
     Policy = 10,
     /// Which transitions a step of reinforcement learning looks at, and its noise.
     Replay = 11,
+    /// Errors of sensors, where they are simulated.
+    Noise = 12,
 }
 
 /// The generator of `(seed, stream, index)`.

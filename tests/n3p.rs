@@ -44,7 +44,7 @@ fn has_free_connection(grid: &Grid, cell: &Cell, vehicle: &Vehicle, pose: Pose) 
 #[test]
 fn every_pose_the_knn_selects_has_a_free_curve_in_the_scenes_own_cell() {
     let model = Model::load(Path::new("models/knn.bin")).unwrap();
-    let vehicle = *model.vehicle();
+    let vehicle = *model.vehicle().unwrap();
     let selector = model.into_selector();
     let grid = *selector.grid();
     let (mut asked, mut answered) = (0, 0);

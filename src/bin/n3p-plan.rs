@@ -42,6 +42,10 @@ struct Args {
     /// Seconds that the program of --policy may take for an answer.
     #[arg(long, value_name = "SECONDS", default_value_t = 5.0, requires = "policy", value_parser = cli::seconds, allow_negative_numbers = true)]
     policy_limit: f64,
+    /// Keep so many metres from obstacles, 0 to 1; less along the whole path where start or goal
+    /// is nearer to one. Never less than 5 mm where they allow it.
+    #[arg(long, default_value_t = 0.0, value_name = "METRES", value_parser = cli::margin, allow_hyphen_values = true)]
+    margin: f64,
     /// Write the path to this JSON file.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -108,7 +112,7 @@ fn main() -> ExitCode {
 fn plan(args: &Args) -> Result<ExitCode> {
     let scene = Scene::read(&args.scene).or_bad_input()?;
     let file = args.scene.display();
-    let problem = Problem::new(&scene)
+    let problem = Problem::with_margin(&scene, args.margin)
         .map_err(|e| BadInput(format!("{file}: {e}; move it to where the car fits")))?;
     let unwritable = |path: &Path, e: io::Error| {
         let text =
@@ -118,11 +122,20 @@ fn plan(args: &Args) -> Result<ExitCode> {
     for path in args.out.iter().chain(&args.svg).chain(&args.trajectory) {
         check_writable(path).map_err(|e| unwritable(path, e))?;
     }
+    if problem.margin < args.margin {
+        tracing::warn!(
+            "start or goal is nearer to an obstacle than --margin {}: the whole path may come as \
+             near as {} m",
+            args.margin,
+            problem.margin
+        );
+    }
     let (method, models) = choose(args, &scene, &problem)?;
     let mut planner = method.build(&models, &MethodSettings::default()).or_bad_input()?;
     let case = Case { kind: problem.kind, level: None, scene };
     // One run, as it comes: the time includes what a first call costs.
-    let once = EpisodeConfig { repeats: 0, ..EpisodeConfig::new(args.max_expansions) };
+    let usual = EpisodeConfig::new(args.max_expansions);
+    let once = EpisodeConfig { repeats: 0, margin_m: args.margin, ..usual };
     let episode = episode::run(&case, planner.as_mut(), &once)?;
 
     if let (Some(out), Some(path)) = (&args.out, &episode.path) {
@@ -143,9 +156,10 @@ fn plan(args: &Args) -> Result<ExitCode> {
         _ => None,
     };
     if args.json {
-        let (row, path) = (&episode.row, &episode.path);
-        let spot = SpotReport::new(&episode, &models);
-        let mut result = serde_json::json!({"row": row, "path": path, "spot": spot});
+        let Episode { row, path, problem, .. } = &episode;
+        let (spot, margin) = (SpotReport::new(&episode, &models), problem.margin);
+        let mut result =
+            serde_json::json!({"row": row, "path": path, "margin_m": margin, "spot": spot});
         if let Some(report) = &trajectory {
             result["trajectory"] = serde_json::json!(report);
         }
@@ -196,11 +210,12 @@ fn choose(args: &Args, scene: &Scene, problem: &Problem) -> Result<(Method, Mode
 }
 
 fn summary(episode: &Episode) -> String {
-    let row = &episode.row;
+    let (row, margin) = (&episode.row, episode.problem.margin);
     let time = row.plan_time_s * 1e3;
     let (Some(length), Some(changes)) = (row.length_m, row.direction_changes) else {
+        let hint = if margin > Problem::MARGIN { "; try a smaller --margin" } else { "" };
         return format!(
-            "{}: no path by {}: {} (after {} expansions, {time:.3} ms)",
+            "{}: no path by {}: {} (margin {margin} m, after {} expansions, {time:.3} ms){hint}",
             row.scene, row.method, row.reason, row.nodes
         );
     };
@@ -210,6 +225,7 @@ fn summary(episode: &Episode) -> String {
         format!("  length            {length:.2} m"),
         format!("  direction changes {changes}"),
         format!("  clearance         {clearance}"),
+        format!("  margin            {margin} m"),
         format!("  planning time     {time:.3} ms"),
         format!("  expansions        {}", row.nodes),
     ];

@@ -24,6 +24,9 @@ pub struct Case {
 pub struct EpisodeConfig {
     /// Expansion budget.
     pub budget: Budget,
+    /// Clearance that plans keep where start and goal allow it, metres, 0 to 1: see
+    /// [`Problem::with_margin`].
+    pub margin_m: f64,
     /// At most so many timed runs after the first.
     pub repeats: usize,
     /// No further run begins once the runs so far took this long together, seconds.
@@ -31,9 +34,10 @@ pub struct EpisodeConfig {
 }
 
 impl EpisodeConfig {
-    /// The usual timing with `max_expansions`.
+    /// The usual timing and margin with `max_expansions`.
     pub fn new(max_expansions: usize) -> Self {
-        Self { budget: Budget { max_expansions }, repeats: 5, repeat_within_s: 0.05 }
+        let budget = Budget { max_expansions };
+        Self { budget, margin_m: Problem::MARGIN, repeats: 5, repeat_within_s: 0.05 }
     }
 }
 
@@ -65,12 +69,12 @@ pub fn run(
     planner: &mut dyn Planner,
     config: &EpisodeConfig,
 ) -> Result<Episode, ProblemError> {
-    let (problem, result, first_s) = timed(&case.scene, planner, config.budget)?;
+    let (problem, result, first_s) = timed(&case.scene, planner, config)?;
     let mut times = Vec::new();
     let mut total_s = first_s;
     let mut repeatable = true;
     while total_s < config.repeat_within_s && times.len() < config.repeats {
-        let (_, again, seconds) = timed(&case.scene, planner, config.budget)?;
+        let (_, again, seconds) = timed(&case.scene, planner, config)?;
         repeatable &= again.outcome == result.outcome && again.expansions == result.expansions;
         times.push(seconds);
         total_s += seconds;
@@ -91,11 +95,11 @@ pub fn run(
 fn timed(
     scene: &Scene,
     planner: &mut dyn Planner,
-    budget: Budget,
+    config: &EpisodeConfig,
 ) -> Result<(Problem, PlanResult, f64), ProblemError> {
     let start = Instant::now();
-    let problem = Problem::new(scene)?;
-    let result = planner.plan(&problem, budget);
+    let problem = Problem::with_margin(scene, config.margin_m)?;
+    let result = planner.plan(&problem, config.budget);
     Ok((problem, result, start.elapsed().as_secs_f64()))
 }
 

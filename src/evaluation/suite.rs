@@ -24,6 +24,9 @@ pub struct SuiteConfig {
     pub settings: MethodSettings,
     /// Expansion budget per episode.
     pub max_expansions: usize,
+    /// Clearance that plans keep where start and goal allow it, metres, 0 to 1: see
+    /// [`Problem::with_margin`].
+    pub margin_m: f64,
     /// Worker threads. More than one disturbs the times, never the results.
     pub threads: usize,
 }
@@ -124,7 +127,7 @@ pub fn check(cases: &[Case], models: &Models, config: &SuiteConfig) -> Result<()
                 models.check_kind(method, &scene.vehicle, kind)?;
             }
         }
-        Problem::new(scene)
+        Problem::with_margin(scene, config.margin_m)
             .map_err(|error| SuiteError::Unsolvable { scene: scene.name.clone(), error })?;
     }
     Ok(())
@@ -162,7 +165,8 @@ where
             let (send, next) = (send.clone(), &next);
             scope.spawn(move || {
                 let mut planners = config.build_all(models).expect("checked above");
-                let episodes = EpisodeConfig::new(config.max_expansions);
+                let usual = EpisodeConfig::new(config.max_expansions);
+                let episodes = EpisodeConfig { margin_m: config.margin_m, ..usual };
                 loop {
                     let job = next.fetch_add(1, Ordering::Relaxed);
                     if job >= total {

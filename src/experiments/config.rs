@@ -8,7 +8,7 @@ use crate::dataset::{CollectConfig, Subset};
 use crate::evaluation::suite::MAX_COUNT;
 use crate::evaluation::{Method, MethodSettings, SuiteConfig};
 use crate::files::{TomlError, read_toml};
-use crate::planners::HybridAStarConfig;
+use crate::planners::{HybridAStarConfig, Problem};
 use crate::rl::courses::Course;
 use crate::rl::rollout::RolloutConfig;
 use crate::selectors::guided::RankedConfig;
@@ -140,6 +140,7 @@ impl EvaluateConfig {
             methods: methods.to_vec(),
             settings: MethodSettings { planner: self.planner, n3p: self.n3p, rl: self.rl },
             max_expansions: self.max_expansions,
+            margin_m: Problem::MARGIN,
             threads: 1,
         }
     }

@@ -1,6 +1,6 @@
 //! A problem: a scene in planning coordinates, indexed and checked.
 
-use crate::geometry::{Frame, Pose};
+use crate::geometry::{Frame, Pose, Vec2};
 use crate::vehicle::{Gear, Vehicle};
 use crate::world::cell::{Cell, Grid};
 use crate::world::collision::CollisionWorld;
@@ -24,8 +24,10 @@ pub struct Problem {
     pub goal: Pose,
     /// The obstacles, planning frame.
     pub obstacles: Obstacles,
-    /// The same obstacles, indexed for swept checks of this vehicle.
+    /// The same obstacles, indexed for swept checks of this vehicle grown by the margin.
     pub collision: CollisionWorld,
+    /// Clearance that plans keep from obstacles, metres: see [`Problem::with_margin`].
+    pub margin: f64,
 }
 
 /// A problem that has no solution by its own data.
@@ -44,22 +46,42 @@ impl Problem {
     /// Room for consumers that interpolate sampled poses linearly.
     pub const MARGIN: f64 = 0.005;
 
-    /// The problem of a validated scene.
+    /// The largest margin that can be asked for, metres.
+    pub const MAX_MARGIN: f64 = 1.0;
+
+    /// The problem of a validated scene, with the usual [`Problem::MARGIN`].
     pub fn new(scene: &Scene) -> Result<Problem, ProblemError> {
+        Self::with_margin(scene, Self::MARGIN)
+    }
+
+    /// The problem of a validated scene whose plans keep `margin` metres from obstacles, and
+    /// never less than [`Problem::MARGIN`], where start and goal allow it.
+    ///
+    /// A plan contains its start and its goal. Where one of them is nearer to an obstacle, less
+    /// is kept along the whole plan: the most whole centimetres that both allow, the usual margin
+    /// where that is less than one, and 0 where they do not allow that either. The field `margin`
+    /// says what it came to. Whole centimetres, because planners prepare themselves for every
+    /// footprint they meet.
+    ///
+    /// # Panics
+    ///
+    /// If `margin` is not from 0 to [`Problem::MAX_MARGIN`].
+    pub fn with_margin(scene: &Scene, margin: f64) -> Result<Problem, ProblemError> {
+        assert!((0.0..=Self::MAX_MARGIN).contains(&margin), "a margin of {margin} m");
         let SpotGuess { frame, kind, obstacles } = spot::guess(scene);
         let bounds = scene.bounds.map(|b| spot::bounds_in_frame(b, &frame));
         let start = frame.local_from_world(scene.start);
         let goal = frame.local_from_world(scene.goal);
-        Self::checked(scene.vehicle, frame, kind, start, goal, obstacles, bounds).map_err(|e| {
-            match e {
+        Self::checked(scene.vehicle, frame, kind, [start, goal], obstacles, bounds, margin).map_err(
+            |e| match e {
                 ProblemError::StartInCollision(_) => {
                     ProblemError::StartInCollision(scene.start.into())
                 }
                 ProblemError::GoalInCollision(_) => {
                     ProblemError::GoalInCollision(scene.goal.into())
                 }
-            }
-        })
+            },
+        )
     }
 
     /// The problem of parking in an abstracted environment, as the data collection does.
@@ -70,22 +92,27 @@ impl Problem {
         start: Pose,
     ) -> Result<Problem, ProblemError> {
         let goal = grid.goal(cell.kind, &vehicle);
-        let walls = grid.walls(cell);
-        Self::checked(vehicle, Frame::WORLD, Some(cell.kind), start, goal, walls, None)
+        let (walls, ends) = (grid.walls(cell), [start, goal]);
+        Self::checked(vehicle, Frame::WORLD, Some(cell.kind), ends, walls, None, Self::MARGIN)
     }
 
     fn checked(
         vehicle: Vehicle,
         frame: Frame,
         kind: Option<ParkingType>,
-        start: Pose,
-        goal: Pose,
+        [start, goal]: [Pose; 2],
         obstacles: Obstacles,
-        bounds: Option<[crate::geometry::Vec2; 4]>,
+        bounds: Option<[Vec2; 4]>,
+        margin: f64,
     ) -> Result<Problem, ProblemError> {
-        let mut collision = CollisionWorld::new(&obstacles, bounds, &vehicle, Self::MARGIN);
-        if !(collision.pose_is_free(start) && collision.pose_is_free(goal)) {
-            collision = collision.with_margin(&vehicle, 0.0);
+        let mut margin = margin.max(Self::MARGIN);
+        let mut collision = CollisionWorld::new(&obstacles, bounds, &vehicle, margin);
+        for smaller in Self::margins_below(margin) {
+            if collision.pose_is_free(start) && collision.pose_is_free(goal) {
+                break;
+            }
+            margin = smaller;
+            collision = collision.with_margin(&vehicle, margin);
         }
         if !collision.pose_is_free(start) {
             return Err(ProblemError::StartInCollision(start.into()));
@@ -93,7 +120,13 @@ impl Problem {
         if !collision.pose_is_free(goal) {
             return Err(ProblemError::GoalInCollision(goal.into()));
         }
-        Ok(Problem { vehicle, frame, kind, start, goal, obstacles, collision })
+        Ok(Problem { vehicle, frame, kind, start, goal, obstacles, collision, margin })
+    }
+
+    /// What is tried in turn where start or goal does not allow `margin`, metres.
+    fn margins_below(margin: f64) -> impl Iterator<Item = f64> {
+        let centimetres = (1..100).rev().map(|cm| f64::from(cm) / 100.0);
+        centimetres.chain([Self::MARGIN]).filter(move |&m| m < margin).chain([0.0])
     }
 
     /// Gears in which a straight may enter the spot: the goal of a bay is the *set* of
