@@ -105,8 +105,13 @@ pub enum ExperimentError {
         error: Box<ExperimentError>,
     },
     /// The models given cannot be used.
-    #[error("--models or --policies: {0}")]
-    GivenModels(ArtefactError),
+    #[error("{option}: {error}")]
+    GivenModels {
+        /// The option that gave them.
+        option: &'static str,
+        /// What is wrong with one.
+        error: ArtefactError,
+    },
     /// The worker threads could not be started.
     #[error("collect: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
@@ -118,7 +123,7 @@ impl ExperimentError {
         match self {
             Self::Io { .. } | Self::Suite(_) => true,
             Self::GivenData(_) | Self::OtherData { .. } => true,
-            Self::GivenModels(_) | Self::Models(_) | Self::Useless { .. } => true,
+            Self::GivenModels { .. } | Self::Models(_) | Self::Useless { .. } => true,
             Self::Part { error, .. } => error.is_bad_input(),
             Self::Collect(e) => e.is_bad_input(),
             Self::Training(e) => e.is_bad_input(),
@@ -413,14 +418,16 @@ impl Runner<'_> {
 
     /// Says that what cannot be loaded was given, if it was.
     fn model_error(&self, error: ModelsError) -> ExperimentError {
-        match error {
-            ModelsError::Load(error) if self.given.models.is_some() => {
-                ExperimentError::GivenModels(error)
+        let option = match self.given {
+            Given { models: Some(_), .. } => Some("--models"),
+            Given { policies: Some(_), .. } => Some("--policies"),
+            _ => None,
+        };
+        match (error, option) {
+            (ModelsError::Load(error), Some(option)) => {
+                ExperimentError::GivenModels { option, error }
             }
-            ModelsError::Load(error) if self.given.policies.is_some() => {
-                ExperimentError::GivenModels(error)
-            }
-            error => error.into(),
+            (error, _) => error.into(),
         }
     }
 
