@@ -15,7 +15,8 @@ const BUDGET: Budget = Budget { max_expansions: 200_000 };
 
 /// The scene as it lies in `frame`, seen from the world.
 fn moved(scene: &Scene, frame: &Frame) -> Scene {
-    let point = |&[x, y]: &[f64; 2]| <[f64; 2]>::from(frame.world_from_local_point(Vec2::new(x, y)));
+    let point =
+        |&[x, y]: &[f64; 2]| <[f64; 2]>::from(frame.world_from_local_point(Vec2::new(x, y)));
     let mut moved = Scene {
         start: frame.world_from_local(scene.start),
         goal: frame.world_from_local(scene.goal),

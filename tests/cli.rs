@@ -170,7 +170,10 @@ fn eval_refuses_bad_arguments() {
         (&["--methods", "policy"], &["--policy FILE.onnx", "docs/policies.md"]),
         (&["--policy", "none.onnx"], &["none.onnx", "no such file"]),
         (&["--policy", "no-such-program --fast"], &["no-such-program"]),
-        (&["--policy", "file", "--policy-limit", "-1"], &["--policy-limit", "between 0.001 and 86400 seconds"]),
+        (
+            &["--policy", "file", "--policy-limit", "-1"],
+            &["--policy-limit", "between 0.001 and 86400 seconds"],
+        ),
         (&["--policy-limit", "2"], &["--policy"]),
         (&["--model", "none.bin"], &["none.bin", "n3p-train"]),
         (&["--model", "file"], &["file", "empty"]),

@@ -12,6 +12,7 @@ use n3p::evaluation::suite::{self, SuiteConfig};
 use n3p::evaluation::{Case, Method, MethodSettings, Models, Outputs, metrics};
 use n3p::progress;
 use n3p::rl::source::PolicySource;
+use n3p::vehicle::Vehicle;
 use n3p::world::{Level, ParkingType};
 
 /// Evaluates planning methods on generated scenes, or on a folder of scene files.
@@ -45,6 +46,10 @@ struct Args {
     /// Seed of the generated scenes and of the intervals.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Vehicle of the generated scenes, a TOML file such as experiments/vehicles/tpcap.toml
+    /// [default: that of the first model].
+    #[arg(long, value_name = "FILE", conflicts_with = "scenes")]
+    vehicle: Option<PathBuf>,
     /// Evaluate the scene files of this folder instead of generated scenes.
     #[arg(long, value_name = "DIR", conflicts_with = "count")]
     scenes: Option<PathBuf>,
@@ -136,7 +141,10 @@ fn cases(args: &Args, methods: &[Method], models: &Models) -> Result<(Vec<Case>,
         return Ok((cases, title));
     }
     // Without --type: all that the models of the chosen methods know.
-    let vehicle = models.vehicle().unwrap_or_default();
+    let vehicle = match &args.vehicle {
+        Some(path) => Vehicle::read(path).or_bad_input()?,
+        None => models.vehicle().unwrap_or_default(),
+    };
     let known =
         |k: &ParkingType| methods.iter().all(|m| models.check_kind(*m, &vehicle, *k).is_ok());
     let kinds = match args.kind {

@@ -165,8 +165,12 @@ fn plan(args: &Args) -> Result<ExitCode> {
         }
         cli::print(result)?;
     } else {
-        let spot = SpotReport::new(&episode, &models).map(|s| format!("
-{s}"));
+        let spot = SpotReport::new(&episode, &models).map(|s| {
+            format!(
+                "
+{s}"
+            )
+        });
         let time = trajectory.as_ref().map(in_time);
         cli::print(summary(&episode) + &spot.unwrap_or_default() + &time.unwrap_or_default())?;
     }

@@ -193,12 +193,18 @@ fn fleet(args: &FleetArgs) -> anyhow::Result<ExitCode> {
     artefact::check_writable(&args.out).or_bad_input()?;
     let sets = args.data.iter().map(|folder| Dataset::read(folder, None).or_bad_input());
     let sets = sets.collect::<anyhow::Result<Vec<_>>>()?;
-    let log = training::fleet::train(&sets, &args.out)
-        .map_err(|e| if e.is_bad_input() { BadInput(e.to_string()).into() } else { anyhow::Error::from(e) })?;
+    let log = training::fleet::train(&sets, &args.out).map_err(|e| {
+        if e.is_bad_input() { BadInput(e.to_string()).into() } else { anyhow::Error::from(e) }
+    })?;
     for (kind, samples, manoeuvres) in &log.kinds {
         cli::print(format!("{kind}: {manoeuvres} manoeuvres from {samples} samples"))?;
     }
-    cli::print(format!("{}: {} vehicles, {} bytes", args.out.display(), log.fleet.len(), log.bytes))?;
+    cli::print(format!(
+        "{}: {} vehicles, {} bytes",
+        args.out.display(),
+        log.fleet.len(),
+        log.bytes
+    ))?;
     Ok(ExitCode::SUCCESS)
 }
 

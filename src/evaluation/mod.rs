@@ -7,8 +7,8 @@
 //! plots and a gallery of the paths that [`trace`] kept. [`draw`] makes pictures of scenes and
 //! paths, [`trajectory_file`] puts a path in time. [`learning_curve`] is what experiments add: how much data is enough.
 
-pub mod draw;
 pub mod by_vehicle;
+pub mod draw;
 pub mod episode;
 pub mod export;
 pub mod html;

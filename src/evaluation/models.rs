@@ -124,8 +124,7 @@ impl Models {
         let (header, actor) = policy_file::load(&path)?;
         let course = header.course;
         let training = artefact::policy_training(course.name());
-        let own =
-            self.of_exactly(Origin { path: path.clone(), training, vehicle: header.vehicle });
+        let own = self.of_exactly(Origin { path: path.clone(), training, vehicle: header.vehicle });
         if own.actors.insert(course, actor).is_some() {
             return Err(ModelsError::TwoPolicies { path, course: course.name() });
         }
@@ -278,4 +277,3 @@ impl VehicleModels {
         self.selector(method).is_some() || method.course().is_some_and(|c| self.actor(c).is_some())
     }
 }
-

@@ -62,13 +62,16 @@ impl SpotReport {
 
 impl fmt::Display for SpotReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Some(kind) = self.parking_type else { return write!(f, "  spot              none found") };
+        let Some(kind) = self.parking_type else {
+            return write!(f, "  spot              none found");
+        };
         write!(f, "  spot              {kind}")?;
         if let (Some(lane), Some(spot), Some(end)) =
             (self.lane_width_m, self.spot_width_m, self.dead_end_m)
         {
             // Open sides have no width.
-            let width = if spot.is_finite() { format!("{spot:.2} m wide") } else { "open".to_owned() };
+            let width =
+                if spot.is_finite() { format!("{spot:.2} m wide") } else { "open".to_owned() };
             write!(f, ", {width}; lane {lane:.2} m wide, free for {end:.2} m past it")?;
         }
         Ok(())

@@ -82,8 +82,7 @@ impl FleetSelector {
             serde_json::from_str(&json).map_err(|e| damaged(e.to_string()))?;
         let mut manoeuvres = Vec::new();
         for &(kind, count, segments) in &header.kinds {
-            let values =
-                tensor_file::f32s(&tensors, &format!("{kind}.segments"), &[segments, 2])?;
+            let values = tensor_file::f32s(&tensors, &format!("{kind}.segments"), &[segments, 2])?;
             let counts = tensor_file::f32s(&tensors, &format!("{kind}.counts"), &[count])?;
             let (pairs, _) = values.as_chunks::<2>();
             let within = |[curvature, _]: &[f32; 2]| curvature.abs() <= 1.0 + 1e-6;

@@ -4,7 +4,7 @@
 //! HARS to the pose → HARS from the pose to the goal. [`GuidedPlanner::ranked`] is ours: the
 //! manoeuvres the selector knows are ranked, and the first that is free and that a free curve
 //! joins is the plan, without any search. Where there is none, several poses of the selector
-//! are tried, then one search goes to all of these poses, and full HARS is the last resort.
+//! are tried, then one search goes to the goal or any of these poses.
 //! Either way the path leaves certified by the exact swept check.
 
 use std::sync::Arc;
@@ -26,10 +26,6 @@ use super::{Features, PoseSelector};
 /// Expansions that the paper's two legs may spend, so that a pose just beside the feasible
 /// ones does not use up what the full search needs.
 const LEG_EXPANSIONS: usize = 5_000;
-/// Expansions that `n3p` spends on the way to the preparatory poses before it searches for
-/// the goal itself.
-const APPROACH_EXPANSIONS: usize = 1_000;
-
 /// What `n3p` tries before it searches. The paper's rows have no such settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -186,8 +182,7 @@ impl GuidedPlanner {
             };
             return Ok((plan.path, guidance));
         }
-        let plain = self.hars.goal_set(problem);
-        let mut goal = plain.clone();
+        let mut goal = self.hars.goal_set(problem);
         for found in found.iter().take(config.abstractions) {
             self.select(problem, found, config.candidates);
             let of_cell = self.hars.goal_set_of_cell(problem, found.shift);
@@ -207,19 +202,12 @@ impl GuidedPlanner {
         if let Some(leg) = self.hars.direct(problem, problem.start, &goal) {
             return Ok((leg.path, guidance(goal.entries().get(leg.entry), Route::Direct)));
         }
-        if let Some(preparatory) = goal.only_preparatory() {
-            let share = (*left).min(APPROACH_EXPANSIONS);
-            *left -= share;
-            let mut spend = share;
-            let leg = self.hars.search(problem, problem.start, &preparatory, None, &mut spend);
-            *left += spend;
-            if let Ok(leg) = leg {
-                let entry = preparatory.entries().get(leg.entry);
-                return Ok((leg.path, guidance(entry, Route::Searched)));
-            }
-        }
-        let leg = self.hars.search(problem, problem.start, &plain, None, left)?;
-        Ok((leg.path, guidance(None, Route::Fallback)))
+        // One search: it begins at the goal and at every preparatory pose.
+        let leg = self.hars.search(problem, problem.start, &goal, None, left)?;
+        let entry = goal.entries().get(leg.entry);
+        let by_way = entry.is_some_and(|e| e.preparatory);
+        let route = if by_way { Route::Searched } else { Route::Fallback };
+        Ok((leg.path, guidance(entry, route)))
     }
 
     /// `pose`, or one beside it, from which a curve leads to the goal, and that curve.
