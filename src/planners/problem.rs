@@ -4,7 +4,7 @@ use crate::geometry::{Frame, Pose, Vec2};
 use crate::vehicle::{Gear, Vehicle};
 use crate::world::cell::{Cell, Grid};
 use crate::world::collision::CollisionWorld;
-use crate::world::spot::{self, SpotGuess};
+use crate::world::spot::{self, Precision, SpotGuess};
 use crate::world::{Obstacles, ParkingType, Scene};
 
 /// What planners see: everything in the planning frame (the spot frame where the scene
@@ -54,6 +54,12 @@ impl Problem {
         Self::with_margin(scene, Self::MARGIN)
     }
 
+    /// [`Problem::new`] without rounding anything ([`Precision`]): what policies are trained in,
+    /// where nothing is to be the same anywhere on a map.
+    pub fn as_given(scene: &Scene) -> Result<Problem, ProblemError> {
+        Self::seen(scene, Self::MARGIN, Precision::Given)
+    }
+
     /// The problem of a validated scene whose plans keep `margin` metres from obstacles, and
     /// never less than [`Problem::MARGIN`], where start and goal allow it.
     ///
@@ -68,10 +74,20 @@ impl Problem {
     /// If `margin` is not from 0 to [`Problem::MAX_MARGIN`].
     pub fn with_margin(scene: &Scene, margin: f64) -> Result<Problem, ProblemError> {
         assert!((0.0..=Self::MAX_MARGIN).contains(&margin), "a margin of {margin} m");
-        let SpotGuess { frame, kind, obstacles } = spot::guess(scene);
-        let bounds = scene.bounds.map(|b| spot::bounds_in_frame(b, &frame));
-        let start = frame.local_from_world(scene.start);
-        let goal = frame.local_from_world(scene.goal);
+        Self::seen(scene, margin, Precision::Rounded)
+    }
+
+    fn seen(scene: &Scene, margin: f64, precision: Precision) -> Result<Problem, ProblemError> {
+        let SpotGuess { frame, kind, obstacles } = spot::guess(scene, precision);
+        let bounds = scene.bounds.map(|b| spot::bounds_in_frame(b, &frame, precision));
+        let start = precision.pose(frame.local_from_world(scene.start));
+        let goal = match precision {
+            Precision::Given => frame.local_from_world(scene.goal),
+            // By the frame's definition, without its rounding.
+            Precision::Rounded => kind.map_or(Pose::default(), |kind| {
+                scene.vehicle.rear_axle(Pose::new(0.0, 0.0, kind.goal_heading()))
+            }),
+        };
         Self::checked(scene.vehicle, frame, kind, [start, goal], obstacles, bounds, margin).map_err(
             |e| match e {
                 ProblemError::StartInCollision(_) => {

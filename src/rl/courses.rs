@@ -59,7 +59,7 @@ impl Course {
             Self::Eval => {
                 let (config, Stratum { kind, level }) = (GeneratorConfig::default(), stratum);
                 let scene = generate(&config, vehicle, kind, level, seed, index);
-                Problem::new(&scene).expect("generated scenes have free ends")
+                Problem::as_given(&scene).expect("generated scenes have free ends")
             }
         }
     }

@@ -3,8 +3,8 @@
 //! The frame is the spot frame: origin at the parked body's centre, +x along the lane in the
 //! direction of travel, +y out of the spot toward the lane. A spot on the driver's left gives a
 //! left-handed, mirrored frame. Where nothing around the goal looks like a spot beside a lane, the
-//! goal's own frame serves: results then still do not depend on where in the world the scene
-//! lies.
+//! goal's own frame serves, mirrored where the start lies to its right: results then still do
+//! not depend on where in the world the scene lies.
 //!
 //! A goal alone does not say which way its lane lies: ahead of the nose (parked in reverse),
 //! behind the tail (forward) or beside the car (parallel, on either side), each travelled in one of two
@@ -16,6 +16,45 @@ use super::abstraction::{Abstraction, abstractions};
 use super::cell::Grid;
 use super::{Obstacles, ParkingType, Scene};
 use crate::geometry::{Aabb, Frame, Pose, Vec2, segment_in_box};
+
+/// How coordinates are taken into the planning frame.
+///
+/// Far from the origin of their map, coordinates lose digits: 500 km away a tenth of a nanometre.
+/// That is nothing to a car, but enough to decide between equals in a search. Rounding what is seen
+/// from the planning frame makes such scenes the same again, nearly always.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// As given.
+    Given,
+    /// Obstacles to a micrometre, the start to 60 nm and as many nanoradians.
+    Rounded,
+}
+
+impl Precision {
+    /// An obstacle's or border's point.
+    fn point(self, p: Vec2) -> Vec2 {
+        const STEP: f64 = 1.0 / (1 << 20) as f64;
+        match self {
+            Self::Given => p,
+            Self::Rounded => p.map(|v| round_to(v, STEP)),
+        }
+    }
+
+    /// The start.
+    pub fn pose(self, p: Pose) -> Pose {
+        const STEP: f64 = 1.0 / (1 << 24) as f64;
+        let round = |v| round_to(v, STEP);
+        match self {
+            Self::Given => p,
+            Self::Rounded => Pose::new(round(p.x), round(p.y), round(p.heading)),
+        }
+    }
+}
+
+/// Exact for steps that are powers of two.
+fn round_to(v: f64, step: f64) -> f64 {
+    (v / step).round() * step
+}
 
 /// A scene seen from its planning frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,29 +68,40 @@ pub struct SpotGuess {
 }
 
 /// The planning frame of a scene.
-pub fn guess(scene: &Scene) -> SpotGuess {
+pub fn guess(scene: &Scene, precision: Precision) -> SpotGuess {
+    let seen = |frame, kind| {
+        let obstacles = scene.geometry_seen_from(&frame).map(|p| precision.point(p));
+        SpotGuess { frame, kind, obstacles }
+    };
     let Some(kind) = scene.parking_type else {
-        return found(scene).unwrap_or_else(|| {
-            seen(scene, Frame { origin_in_world: scene.goal, mirrored: false }, None)
-        });
+        return found(scene, &seen).unwrap_or_else(|| seen(goal_frame(scene), None));
     };
     let usual = spot_frame(scene, kind);
-    let guess = seen(scene, usual, Some(kind));
+    let guess = seen(usual, Some(kind));
     if lane_is_open(&guess.obstacles, kind) || lane(&guess).is_some() {
         return guess;
     }
     // The car may come from the other side, or stand across the lane.
-    let other = seen(scene, other_way(&usual, kind), Some(kind));
+    let other = seen(other_way(&usual, kind), Some(kind));
     if lane(&other).is_some() { other } else { guess }
 }
 
+/// The goal's own frame, mirrored where the car would start to its right.
+fn goal_frame(scene: &Scene) -> Frame {
+    let plain = Frame { origin_in_world: scene.goal, mirrored: false };
+    Frame { mirrored: plain.local_from_world(scene.start).y < 0.0, ..plain }
+}
+
 /// The likeliest spot: the car stands in its lane rather than elsewhere, and the lane is large.
-fn found(scene: &Scene) -> Option<SpotGuess> {
+fn found(
+    scene: &Scene,
+    seen: &dyn Fn(Frame, Option<ParkingType>) -> SpotGuess,
+) -> Option<SpotGuess> {
     let mut best: Option<((bool, f64), SpotGuess)> = None;
     for kind in ParkingType::ALL {
         let usual = spot_frame(scene, kind);
         for frame in [usual, other_way(&usual, kind)] {
-            let guess = seen(scene, frame, Some(kind));
+            let guess = seen(frame, Some(kind));
             let Some(lane) = lane(&guess) else { continue };
             let merit = merit(&lane, frame.local_from_world(scene.start));
             if best.as_ref().is_none_or(|(most, _)| merit > *most) {
@@ -60,10 +110,6 @@ fn found(scene: &Scene) -> Option<SpotGuess> {
         }
     }
     best.map(|(_, guess)| guess)
-}
-
-fn seen(scene: &Scene, frame: Frame, kind: Option<ParkingType>) -> SpotGuess {
-    SpotGuess { frame, kind, obstacles: scene.geometry_seen_from(&frame) }
 }
 
 /// The largest free lane beside the spot, if there is one.
@@ -129,9 +175,13 @@ fn travels_backward_along_x(start: Pose) -> bool {
 
 /// Corners of a world-aligned box `[xmin, ymin, xmax, ymax]` seen from `frame`,
 /// counter-clockwise there.
-pub fn bounds_in_frame([x0, y0, x1, y1]: [f64; 4], frame: &Frame) -> [Vec2; 4] {
+pub fn bounds_in_frame(
+    [x0, y0, x1, y1]: [f64; 4],
+    frame: &Frame,
+    precision: Precision,
+) -> [Vec2; 4] {
     let mut corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
-        .map(|(x, y)| frame.local_from_world_point(Vec2::new(x, y)));
+        .map(|(x, y)| precision.point(frame.local_from_world_point(Vec2::new(x, y))));
     if frame.mirrored {
         corners.reverse();
     }
@@ -168,7 +218,8 @@ mod tests {
                     let world = Pose::new(3.0, -7.0, turn);
                     let goal = v.rear_axle(Pose::new(0.0, 0.0, kind.goal_heading() * side));
                     let start = Pose::new(-9.0, 5.0 * side, 0.2 * side);
-                    let g = guess(&scene(kind, world.compose(start), world.compose(goal)));
+                    let scene = scene(kind, world.compose(start), world.compose(goal));
+                    let g = guess(&scene, Precision::Given);
                     assert_eq!(g.frame.mirrored, side < 0.0, "{kind} {turn} {side}");
                     let seen = g.frame.local_from_world(world.compose(goal));
                     let expected = v.rear_axle(Pose::new(0.0, 0.0, kind.goal_heading()));
