@@ -15,17 +15,21 @@ level != "" && /^\| (forward|parallel|reverse) / {
   kind = trim($2); name = trim($3)
   if (!((level, kind) in seen)) { seen[level, kind] = 1; order[++n] = level SUBSEP kind }
   mean[level, kind, name] = trim($6)
-  if (trim($4) == "this run") failed[level, kind] += trim($11)
+  share = trim($11) + 0
+  if (trim($4) == "this run" && share > 0) {
+    failed[level, kind] = failed[level, kind] (failed[level, kind] == "" ? "" : ", ") "`" name "` " share " %"
+  }
 }
 END {
   print "| level | type | `ha` (HA*) | `ha-rs` (HA* with RS) | `ha-hold` (HA* Hold) | `mhha` (MHHA*) | `sha` (SHA*) " \
-    "| `mlp-n3p` (MLP-N3P) | `knn-n3p` (KNN-N3P) | `n3p` | failures |"
-  print "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|"
+    "| `rl-simple` (RL Simple) | `rl-eval` (RL Eval) | `mlp-n3p` (MLP-N3P) | `knn-n3p` (KNN-N3P) | `n3p` | failures |"
+  print "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|---|"
   for (i = 1; i <= n; i++) {
     split(order[i], key, SUBSEP); level = key[1]; kind = key[2]
-    printf "| %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s |\n", level, kind, cell("ha", "HA*"),
+    printf "| %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s |\n", level, kind, cell("ha", "HA*"),
       cell("ha-rs", "HA* with RS"), cell("ha-hold", "HA* Hold"), cell("mhha", "MHHA*"), cell("sha", "SHA*"),
+      cell("rl-simple", "RL Simple"), cell("rl-eval", "RL Eval"),
       cell("mlp-n3p", "MLP-N3P"), cell("knn-n3p", "KNN-N3P"), cell("n3p", ""),
-      failed[level, kind] == 0 ? "none" : failed[level, kind] " %"
+      failed[level, kind] == "" ? "none" : failed[level, kind]
   }
 }

@@ -4,7 +4,7 @@
 # changes. P95 is the smallest time that at least 95 % of the episodes do not exceed.
 BEGIN {
   FS = ","
-  count = split("ha ha-rs ha-hold mhha sha mlp-n3p knn-n3p n3p", methods, " ")
+  count = split("ha ha-rs ha-hold mhha sha rl-simple rl-eval mlp-n3p knn-n3p n3p", methods, " ")
   kinds = split("forward parallel reverse", kind, " ")
   levels = split("easy complex extreme", level, " ")
 }
