@@ -222,8 +222,9 @@ impl Vehicle {
             ("rear_overhang", self.rear_overhang, other.rear_overhang),
             ("max_steer", self.max_steer, other.max_steer),
         ];
-        // Negated, so that NaN differs.
-        fields.into_iter().find(|(_, own, others)| !((own - others).abs() <= TOLERANCE))
+        // By what is the same, so that NaN differs.
+        let same = |own: f64, others: f64| (own - others).abs() <= TOLERANCE;
+        fields.into_iter().find(|&(_, own, others)| !same(own, others))
     }
 
     /// Whether `other` can drive whatever this vehicle can, wherever this one fits: its footprint
