@@ -112,3 +112,23 @@ fn what_would_be_lost_or_mixed_up_is_refused() {
     fs::write(&checkpoint, &bytes).unwrap();
     finish(train(dir.path(), &["--resume"]));
 }
+
+#[test]
+fn a_policy_that_is_gone_and_a_vehicle_that_fits_nowhere_are_told() {
+    let dir = tempfile::tempdir().unwrap();
+    finish(train(dir.path(), &["--episodes", "12"]));
+    fs::remove_file(dir.path().join("p.safetensors")).unwrap();
+    let output = train(dir.path(), &["--resume"]).output().unwrap();
+    let e = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(2) && e.contains("p.safetensors: no such file"), "{e}");
+    let wide = "[vehicle]\nlength = 4.97\nwidth = 2.4\nwheelbase = 2.83\nrear_overhang = 1.1\n\
+                max_steer = 0.6\n";
+    fs::write(dir.path().join("wide.toml"), wide).unwrap();
+    for course in ["simple", "eval"] {
+        let mut command = Command::new(cargo_bin!("n3p-train"));
+        command.current_dir(dir.path()).args(["rl", "--env", course, "--config", "wide.toml"]);
+        let output = command.args(["--out", "q.safetensors"]).output().unwrap();
+        let e = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(2) && e.contains("bay_spot_width"), "{e}");
+    }
+}

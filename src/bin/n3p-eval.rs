@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::Parser;
-use n3p::cli::{self, OrBadInput};
+use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::evaluation::report::{self, Provenance};
 use n3p::evaluation::suite::{self, SuiteConfig};
 use n3p::evaluation::{Case, Method, MethodSettings, Models, Outputs, metrics};
@@ -95,6 +95,10 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
         margin_m: args.margin,
         threads: args.threads.into(),
     };
+    if args.policy.is_some() && !config.methods.contains(&Method::Policy) {
+        let text = "--policy: --methods does not name policy; add it there, or leave --policy out";
+        return Err(BadInput(text.to_owned()).into());
+    }
     config.build_all(&models).or_bad_input()?;
     let (cases, scenes) = cases(args, &config.methods, &models)?;
     suite::check(&cases, &models, &config).or_bad_input()?;

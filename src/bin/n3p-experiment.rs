@@ -57,7 +57,7 @@ struct GivenArgs {
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// Folder of models to evaluate instead of collecting and training: knn.bin,
-    /// mlp-TYPE.safetensors
+    /// mlp-TYPE.safetensors, rl-ENV.safetensors
     #[arg(long, value_name = "DIR", conflicts_with = "data")]
     models: Option<PathBuf>,
     /// Folder of policies (rl-ENV.safetensors) to evaluate instead of training them, where the
@@ -117,9 +117,10 @@ fn reproduce(file: &Path, out: Option<&Path>, args: &GivenArgs) -> Result<ExitCo
     let recorded = results(file, &config).join("rows.csv");
     if !recorded.exists() {
         let text = format!(
-            "{}: no rows on record to compare with; make some: n3p-experiment run {}",
+            "{}: no rows on record to compare with; make some: n3p-experiment run {}{}",
             recorded.display(),
-            file.display()
+            file.display(),
+            args.vehicle.as_ref().map_or(String::new(), |v| format!(" --vehicle {}", v.display())),
         );
         return Err(BadInput(text).into());
     }

@@ -158,8 +158,10 @@ fn plan(args: &Args) -> Result<ExitCode> {
     if args.json {
         let Episode { row, path, problem, .. } = &episode;
         let (spot, margin) = (SpotReport::new(&episode, &models), problem.margin);
-        let mut result =
-            serde_json::json!({"row": row, "path": path, "margin_m": margin, "spot": spot});
+        let covered = episode.result.covered;
+        let mut result = serde_json::json!({
+            "row": row, "path": path, "margin_m": margin, "covered": covered, "spot": spot,
+        });
         if let Some(report) = &trajectory {
             result["trajectory"] = serde_json::json!(report);
         }
@@ -191,6 +193,10 @@ fn choose(args: &Args, scene: &Scene, problem: &Problem) -> Result<(Method, Mode
     let policy = policy.transpose().or_bad_input()?;
     let other = if policy.is_some() { Method::Policy } else { Method::N3p };
     let method = args.method.unwrap_or(other);
+    if policy.is_some() && method != Method::Policy {
+        let text = format!("--policy: --method is {method}, not policy; leave one of them out");
+        return Err(BadInput(text).into());
+    }
     let models = match &args.models[..] {
         [] => Models::usual(&[method]),
         given => Models::load(given),

@@ -14,7 +14,7 @@ use n3p::training::rl::{Begin, RlConfig};
 use n3p::training::{self, MlpConfig, TrainingError};
 use n3p::world::ParkingType;
 
-/// Trains a selector from a data set and writes it as one model file.
+/// Trains selectors from data sets, and driving policies; each becomes one model file.
 #[derive(Parser)]
 #[command(version)]
 struct Cli {
@@ -193,6 +193,18 @@ fn fleet(args: &FleetArgs) -> anyhow::Result<ExitCode> {
     artefact::check_writable(&args.out).or_bad_input()?;
     let sets = args.data.iter().map(|folder| Dataset::read(folder, None).or_bad_input());
     let sets = sets.collect::<anyhow::Result<Vec<_>>>()?;
+    for (i, (set, folder)) in sets.iter().zip(&args.data).enumerate() {
+        let bad = |what: String| BadInput(format!("--data {}: {what}", folder.display()));
+        let solved = |kind| set.solved().any(|s| s.cell.kind == kind);
+        if let Some(kind) = ParkingType::ALL.into_iter().find(|k| !solved(*k)) {
+            return Err(bad(format!("it has no solved sample of type {kind}; collect some")).into());
+        }
+        let like = |other: &Dataset| other.metadata.vehicle.is_like(&set.metadata.vehicle);
+        if let Some(other) = sets[..i].iter().position(like) {
+            let other = args.data[other].display();
+            return Err(bad(format!("its vehicle is that of {other}; give one set each")).into());
+        }
+    }
     let log = training::fleet::train(&sets, &args.out).map_err(|e| {
         if e.is_bad_input() { BadInput(e.to_string()).into() } else { anyhow::Error::from(e) }
     })?;

@@ -32,7 +32,10 @@ impl Planner for ByVehicle {
 
     fn plan(&mut self, problem: &Problem, budget: Budget) -> PlanResult {
         let wanted = &problem.vehicle;
-        let own = self.planners.iter().position(|(vehicle, _)| vehicle.is_like(wanted));
+        // Speeds matter to policies alone, and only for them do two vehicles differ in nothing else.
+        let same = self.planners.iter().position(|(vehicle, _)| vehicle.drives_like(wanted));
+        let like = || self.planners.iter().position(|(vehicle, _)| vehicle.is_like(wanted));
+        let own = same.or_else(like);
         let serving =
             own.or_else(|| self.planners.iter().position(|(vehicle, _)| vehicle.covers(wanted)));
         match (serving, &mut self.any) {

@@ -149,7 +149,7 @@ impl Method {
         matches!(self, Self::Ha | Self::HaRs | Self::HaHold | Self::Mhha | Self::Sha)
     }
 
-    /// Whether it needs a trained model, which is bound to one vehicle.
+    /// Whether it needs a trained model, which is bound to its vehicle and those it covers.
     pub fn needs_model(self) -> bool {
         self.needs_selector() || self.course().is_some()
     }

@@ -51,6 +51,9 @@ pub enum ModelsError {
     /// Two KNN files were given.
     #[error("--model {0}: a KNN model was given before; one file holds all types: give one")]
     TwoKnn(PathBuf),
+    /// Two files of manoeuvres for any vehicle were given.
+    #[error("--model {0}: manoeuvres for any vehicle were given before; give one")]
+    TwoFleets(PathBuf),
     /// Two policies of one course were given.
     #[error("--model {path}: a policy of rl-{course} was given before; give one")]
     TwoPolicies {
@@ -99,6 +102,9 @@ impl Models {
 
     fn add_selector(&mut self, model: Model) -> Result<(), ModelsError> {
         let Some(&vehicle) = model.vehicle() else {
+            if self.fleet.is_some() {
+                return Err(ModelsError::TwoFleets(model.path().to_owned()));
+            }
             self.fleet = Some(model.into_selector());
             return Ok(());
         };
@@ -159,7 +165,6 @@ impl Models {
         let mut found = Vec::new();
         if needs(Method::KnnN3p) || needs(Method::N3p) {
             found.push(find_model("knn.bin"));
-            found.extend(knn_of_other_vehicles());
         }
         if needs(Method::N3p) {
             found.push(find_model("fleet.safetensors"));
@@ -171,7 +176,21 @@ impl Models {
         let courses = methods.iter().filter_map(|m| m.course());
         found.extend(courses.map(|c| find_model(policy_file::usual_name(c))));
         found.retain(|path| path.exists());
-        Self::load(&found)
+        let mut models = Self::load(&found)?;
+        if needs(Method::KnnN3p) || needs(Method::N3p) {
+            for path in knn_of_other_vehicles() {
+                let model = Model::load(&path)?;
+                let known = |m: &VehicleModels| {
+                    m.knn.is_some() && model.vehicle().is_some_and(|v| m.vehicle().is_like(v))
+                };
+                if models.vehicles.iter().any(known) {
+                    tracing::warn!("{}: left out: its vehicle has a model", path.display());
+                } else {
+                    models.add_selector(model)?;
+                }
+            }
+        }
+        Ok(models)
     }
 
     /// The models that `method` plans with, vehicle by vehicle.
@@ -182,6 +201,10 @@ impl Models {
     /// The models that `method` plans with for `vehicle`: its own, or else the first that were
     /// trained for one that covers it ([`Vehicle::covers`]).
     pub fn serving(&self, method: Method, vehicle: &Vehicle) -> Option<&VehicleModels> {
+        if method.course().is_some() {
+            // A policy's steps are as long as its speeds say.
+            return self.for_method(method).find(|m| m.vehicle().drives_like(vehicle));
+        }
         let own = self.for_method(method).find(|m| m.vehicle().is_like(vehicle));
         own.or_else(|| self.for_method(method).find(|m| m.vehicle().covers(vehicle)))
     }
@@ -217,8 +240,11 @@ impl Models {
             return Ok(());
         }
         let Origin { path, training, vehicle: trained } = &any.origin;
-        artefact::check_vehicle(path, training, trained, vehicle)
-            .map_err(|error| ModelsError::Vehicle { scene: scene.to_owned(), error })
+        let check = match method.course() {
+            Some(_) => artefact::check_driving(path, training, trained, vehicle),
+            None => artefact::check_vehicle(path, training, trained, vehicle),
+        };
+        check.map_err(|error| ModelsError::Vehicle { scene: scene.to_owned(), error })
     }
 
     /// Refuses a parking type that `method`'s model for `vehicle` was not trained for.

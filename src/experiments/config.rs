@@ -219,12 +219,26 @@ impl ExperimentConfig {
         self.vehicle.validate().map_err(|e| e.to_string())?;
         self.collect.validate().map_err(|e| format!("collect: {e}"))?;
         self.train.mlp.validate().map_err(|e| format!("train.mlp: {e}"))?;
-        self.train.rl.validate().map_err(|e| format!("train.rl: {e}"))?;
+        if self.courses().next().is_some() {
+            self.train.rl.validate().map_err(|e| format!("train.rl: {e}"))?;
+        }
         let e = &self.evaluate;
         if e.methods.contains(&Method::Policy) {
             return Err("evaluate.methods names policy, which only n3p-eval and n3p-plan know; \
                         leave it out"
                 .to_owned());
+        }
+        if self.courses().next().is_some() {
+            for (field, seed) in
+                [("seed", self.seed), ("train.rl.validation_seed", self.train.rl.validation_seed)]
+            {
+                if seed == e.seed {
+                    return Err(format!(
+                        "evaluate.seed is {seed}, that of {field}; choose another one, so that \
+                         policies are not evaluated in scenes they learnt in"
+                    ));
+                }
+            }
         }
         e.planner.validate().map_err(|m| format!("evaluate.planner.{m}"))?;
         e.n3p.validate().map_err(|m| format!("evaluate.n3p.{m}"))?;

@@ -91,7 +91,7 @@ pub enum ExperimentError {
         wanted: String,
     },
     /// Something was given that the experiment has no use for.
-    #[error("{option}: no method of this experiment plans with a model; leave it out")]
+    #[error("{option}: no method of this experiment has a use for it; leave it out")]
     Useless {
         /// The option.
         option: &'static str,
@@ -185,7 +185,8 @@ pub fn run(
     if policies.is_none() {
         runner.train_policies()?;
     }
-    let trained = settings((&data_id, &config.train, &policies));
+    let rl = config.courses().next().map(|_| &config.train.rl);
+    let trained = settings((&data_id, &config.train.mlp, rl, &policies));
     runner.evaluate(runner.ready()?, &trained, &curve)
 }
 
@@ -327,8 +328,8 @@ impl Runner<'_> {
             let rl_settings = settings((&stage, config));
             match self.stages.begin(&stage, &rl_settings, out.exists())? {
                 Todo::Nothing => continue,
-                Todo::GoOn => {}
-                Todo::BeginAnew => remove(&checkpoint_path(&out))?,
+                Todo::GoOn if out.exists() => {}
+                _ => remove(&checkpoint_path(&out))?,
             }
             let log = training::rl::train(course, config, &out, Begin::Resume, &Device::Cpu)?;
             tracing::info!("{stage}: the best policy is that of {} episodes", log.best().episodes);
@@ -353,7 +354,7 @@ impl Runner<'_> {
             let (c, e) = (self.config, &self.config.evaluate);
             let scenes = (&curve.methods, curve.count, curve.seed, &c.vehicle);
             let planning = (&e.types, &e.levels, e.max_expansions, &e.planner, &e.n3p);
-            let settings = settings((&stage, data, part, scenes, planning, &c.train));
+            let settings = settings((&stage, data, part, scenes, planning, &c.train.mlp));
             let known = read_points(&file);
             let todo = self.stages.begin(&stage, &settings, known.is_some())?;
             if let (Todo::Nothing, Some(known)) = (todo, known) {

@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use candle_core::{DType, Device, Result, Tensor, Var};
+use candle_core::{Device, Result, Tensor, Var};
 use rand::RngExt;
 
 use super::{BEAMS, MASK, TARGET};
@@ -234,9 +234,4 @@ impl Network {
         let [first, last] = &self.head;
         last.forward(&first.forward(&x)?.relu()?)
     }
-}
-
-/// Zeros for inputs of one sample, to try a network with.
-pub fn blank_inputs(role: Role, device: &Device) -> Result<Vec<Tensor>> {
-    role.inputs().iter().map(|&size| Tensor::zeros((1, size), DType::F32, device)).collect()
 }

@@ -39,7 +39,12 @@ impl PolicySource {
     /// What ends in `.onnx` is a file, anything else a command line, whose answers may take
     /// `limit_s` seconds each. It is opened once, to see that it can be.
     pub fn new(spec: &str, limit_s: f64) -> Result<Self, SourceError> {
-        let ends_in = |extension| Path::new(spec).extension().is_some_and(|e| e == extension);
+        // A command may name such a file, too.
+        let one_word = Path::new(spec).is_file() || !spec.contains(char::is_whitespace);
+        let ends_in = |extension| {
+            let own = Path::new(spec).extension();
+            one_word && own.is_some_and(|e| e.eq_ignore_ascii_case(extension))
+        };
         if ends_in("safetensors") {
             return Err(SourceError::TrainedHere(spec.into()));
         }

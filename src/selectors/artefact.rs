@@ -219,8 +219,8 @@ impl Model {
     }
 }
 
-/// Compares what decides where a car can drive: dimensions and steering limit. Speeds
-/// only enter times, so a model serves every speed.
+/// Compares what decides where a car can drive: dimensions and steering limit. Speeds only enter
+/// times, so a selector serves every speed.
 ///
 /// `training`: commands that train for the vehicle in FILE.
 pub fn check_vehicle(
@@ -230,6 +230,23 @@ pub fn check_vehicle(
     wanted: &Vehicle,
 ) -> Result<(), ArtefactError> {
     match model.differing_field(wanted) {
+        None => Ok(()),
+        Some((field, model, wanted)) => {
+            let command = format!("{training}, with [vehicle] {field} = {wanted} in FILE");
+            Err(Fault::OtherVehicle { field, model, wanted, command }.of(path))
+        }
+    }
+}
+
+/// [`check_vehicle`] for policies, whose steps are as long as the speeds say.
+pub fn check_driving(
+    path: &Path,
+    training: &str,
+    model: &Vehicle,
+    wanted: &Vehicle,
+) -> Result<(), ArtefactError> {
+    check_vehicle(path, training, model, wanted)?;
+    match model.differing_speed(wanted) {
         None => Ok(()),
         Some((field, model, wanted)) => {
             let command = format!("{training}, with [vehicle] {field} = {wanted} in FILE");

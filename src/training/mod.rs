@@ -28,6 +28,7 @@ use crate::dataset::{Sample, Status};
 use crate::files::TomlError;
 use crate::selectors::artefact::{self, ArtefactError};
 use crate::world::ParkingType;
+use crate::world::generate::GeneratorError;
 
 /// A training that cannot start or go on.
 #[derive(Debug, thiserror::Error)]
@@ -98,6 +99,15 @@ pub enum TrainingError {
          episodes may differ), or choose another --out", .0.display()
     )]
     OtherCheckpoint(PathBuf),
+    /// A vehicle that does not fit the spots to learn in.
+    #[error("vehicle: no problems for this vehicle: {0}")]
+    Vehicle(GeneratorError),
+    /// A checkpoint whose policy is gone.
+    #[error(
+        "{}: no such file, but its checkpoint is here; put the policy back, or remove the \
+         checkpoint to begin anew", .0.display()
+    )]
+    PolicyGone(PathBuf),
     /// A checkpoint that cannot be read.
     #[error("{0}")]
     Checkpoint(ArtefactError),

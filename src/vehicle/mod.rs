@@ -51,7 +51,7 @@ pub struct Vehicle {
     pub rear_overhang: f64,
     /// Largest steering angle of the front wheels, radians.
     pub max_steer: f64,
-    /// Speed when driving forward, m/s (only for times and the Δδ metric).
+    /// Speed when driving forward, m/s (for times, the Δδ metric, and the steps of policies).
     #[serde(default = "default_forward_speed")]
     pub forward_speed: f64,
     /// Speed when driving backward, m/s.
@@ -206,9 +206,24 @@ impl Vehicle {
         center.shifted(-self.center_offset())
     }
 
-    /// Whether `other` is the same car: dimensions and steering limit agree. Speeds do not matter.
+    /// Whether `other` is the same car: dimensions and steering limit agree. Speeds do not matter
+    /// to paths.
     pub fn is_like(&self, other: &Vehicle) -> bool {
         self.differing_field(other).is_none()
+    }
+
+    /// [`Vehicle::is_like`], and the speeds agree, too.
+    pub fn drives_like(&self, other: &Vehicle) -> bool {
+        self.differing_speed(other).is_none() && self.is_like(other)
+    }
+
+    /// The first speed that differs: its name, and both values.
+    pub fn differing_speed(&self, other: &Vehicle) -> Option<(&'static str, f64, f64)> {
+        let fields = [
+            ("forward_speed", self.forward_speed, other.forward_speed),
+            ("backward_speed", self.backward_speed, other.backward_speed),
+        ];
+        fields.into_iter().find(|(_, own, others)| own != others)
     }
 
     /// The first dimension in which `other` is another car: its name, and both values.

@@ -69,12 +69,12 @@ pub struct SpotGuess {
 
 /// The planning frame of a scene.
 pub fn guess(scene: &Scene, precision: Precision) -> SpotGuess {
-    let seen = |frame, kind| {
-        let obstacles = scene.geometry_seen_from(&frame).map(|p| precision.point(p));
-        SpotGuess { frame, kind, obstacles }
-    };
+    let seen = |frame, kind| seen(scene, frame, kind, precision);
     let Some(kind) = scene.parking_type else {
-        return found(scene, &seen).unwrap_or_else(|| seen(goal_frame(scene), None));
+        return match found(scene, precision) {
+            Some((frame, kind)) => seen(frame, Some(kind)),
+            None => seen(goal_frame(scene), None),
+        };
     };
     let usual = spot_frame(scene, kind);
     let guess = seen(usual, Some(kind));
@@ -93,23 +93,38 @@ fn goal_frame(scene: &Scene) -> Frame {
 }
 
 /// The likeliest spot: the car stands in its lane rather than elsewhere, and the lane is large.
-fn found(
-    scene: &Scene,
-    seen: &dyn Fn(Frame, Option<ParkingType>) -> SpotGuess,
-) -> Option<SpotGuess> {
-    let mut best: Option<((bool, f64), SpotGuess)> = None;
+fn found(scene: &Scene, precision: Precision) -> Option<(Frame, ParkingType)> {
+    let near = around_goal(scene);
+    let mut best: Option<((bool, f64), Frame, ParkingType)> = None;
     for kind in ParkingType::ALL {
         let usual = spot_frame(scene, kind);
         for frame in [usual, other_way(&usual, kind)] {
-            let guess = seen(frame, Some(kind));
-            let Some(lane) = lane(&guess) else { continue };
+            let Some(lane) = lane(&seen(&near, frame, Some(kind), precision)) else { continue };
             let merit = merit(&lane, frame.local_from_world(scene.start));
-            if best.as_ref().is_none_or(|(most, _)| merit > *most) {
-                best = Some((merit, guess));
+            if best.is_none_or(|(most, ..)| merit > most) {
+                best = Some((merit, frame, kind));
             }
         }
     }
-    best.map(|(_, guess)| guess)
+    best.map(|(_, frame, kind)| (frame, kind))
+}
+
+/// The scene without what is too far away to enter any cell of the grid, whichever way it lies.
+fn around_goal(scene: &Scene) -> Scene {
+    /// Metres from the parked centre: more than to the farthest corner of the largest cell.
+    const REACH: f64 = 20.0;
+    let center = scene.vehicle.body_center(scene.goal).position();
+    let all = Aabb { min: center, max: center }.inflated(REACH);
+    let point = |&[x, y]: &[f64; 2]| Vec2::new(x, y);
+    let mut near = scene.clone();
+    near.obstacles.retain(|o| Aabb::around(o.iter().map(point)).intersects(&all));
+    near.points.retain(|p| all.contains(point(p)));
+    near
+}
+
+fn seen(scene: &Scene, frame: Frame, kind: Option<ParkingType>, precision: Precision) -> SpotGuess {
+    let obstacles = scene.geometry_seen_from(&frame).map(|p| precision.point(p));
+    SpotGuess { frame, kind, obstacles }
 }
 
 /// The largest free lane beside the spot, if there is one.

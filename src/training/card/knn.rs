@@ -57,7 +57,8 @@ are compared as points (x, y, r·cos θ, r·sin θ) with r = {radius:.4} m: half
 - **To the pose: no guarantee.** The way from the start to the pose may take a search.
 - **Manoeuvres are not bound to cells**: they end at the parked pose, but are free only where the
   planner finds them so.
-- **One vehicle**: {vehicle}. For any other the model is refused.
+- **One vehicle**: {vehicle}. It serves
+  vehicles that this one covers, too (docs/vehicles.md); for any other the model is refused.
 - **Cells of the grid below.** Smaller spots, lanes and dead ends have no cell, hence no answer.
 - Taken from this planner's own solutions in free space that is two rectangles, not from drivers.
 

@@ -59,7 +59,8 @@ precision. Inputs and outputs are normalised; the file holds the scaling.
 
 - **No guarantee.** Nothing ensures that a curve leads from the proposed pose into the spot, or that the
   pose is free. Of the rows kept apart that were judged, {to_goal} had such a curve.
-- **One vehicle**: {vehicle}. For any other the model is refused.
+- **One vehicle**: {vehicle}. It serves
+  vehicles that this one covers, too (docs/vehicles.md); for any other the model is refused.
 - **{Spots} only**, in cells of the grid below. Smaller spots, lanes and dead ends have
   no cell, hence no answer.
 - Learnt from this planner's own solutions in free space that is two rectangles, not from drivers.

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::log::RlLog;
 use super::strata::Strata;
+use crate::rl::courses::Stratum;
 use crate::rl::encoding::InputScale;
 use crate::rl::network::{Parameters, Role};
 use crate::rl::parking_env::Progress;
@@ -156,6 +157,14 @@ fn decode(bytes: &[u8], device: &Device) -> Result<(State, Sac, Replay), Fault> 
     state.scale.validate().map_err(damaged)?;
     let config = &state.log.config;
     config.validate().map_err(|e| damaged(e.to_string()))?;
+    let log = &state.log;
+    let fits = state.slots.len() == config.environments
+        && state.slots.iter().all(|s| s.stratum < Stratum::COUNT && s.index < u64::MAX)
+        && state.strata.is_sound()
+        && log.best < log.points.len();
+    if !fits {
+        return Err(damaged("the state contradicts its settings".to_owned()));
+    }
     let network = |(prefix, role): (&str, Role)| {
         let mut values = BTreeMap::new();
         for (name, shape) in role.shapes() {
@@ -183,6 +192,7 @@ fn decode(bytes: &[u8], device: &Device) -> Result<(State, Sac, Replay), Fault> 
     }
     let replay = tensors.tensor("replay").map_err(|e| damaged(e.to_string()))?.data().to_vec();
     let replay = Replay::restored(config.replay, replay, state.replay_next)
+        .filter(|r| !r.is_empty())
         .ok_or_else(|| damaged("the replay memory is of another size".to_owned()))?;
     Ok((state, agent, replay))
 }

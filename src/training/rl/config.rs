@@ -9,6 +9,7 @@ use crate::rl::parking_env::EnvConfig;
 use crate::rl::sac::SacConfig;
 use crate::training::TrainingError;
 use crate::vehicle::Vehicle;
+use crate::world::generate::GeneratorConfig;
 
 /// Settings of the training; where it learns is said apart.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -45,7 +46,7 @@ impl Default for RlConfig {
     fn default() -> Self {
         Self {
             episodes: 10_000,
-            seed: 1,
+            seed: 4711,
             environments: 8,
             warm_up: 10_240,
             steps_per_update: 4,
@@ -97,6 +98,7 @@ impl RlConfig {
             value: e.value.to_string(),
             expected: e.expected,
         })?;
+        GeneratorConfig::default().validate(&self.vehicle).map_err(TrainingError::Vehicle)?;
         let (env, sac) = (&self.env, &self.sac);
         whole("env.horizon", env.horizon as usize, 100_000, "a whole number from 1 to 100000")?;
         real("env.parked_overlap", env.parked_overlap, 0.01..=1.0, "a number from 0.01 to 1")?;
@@ -128,7 +130,10 @@ mod tests {
         let refused = |config: RlConfig| config.validate().unwrap_err().to_string();
         let default = RlConfig::default();
         let e = refused(RlConfig { validation_seed: default.seed, ..default.clone() });
-        assert!(e.starts_with("validation_seed is 1; expected another seed"), "{e}");
+        assert!(e.starts_with("validation_seed is 4711; expected another seed"), "{e}");
+        let vehicle = Vehicle { width: 2.5, ..default.vehicle };
+        let e = refused(RlConfig { vehicle, ..default.clone() });
+        assert!(e.contains("no problems for this vehicle") && e.contains("bay_spot_width"), "{e}");
         let sac = SacConfig { discount: f64::NAN, ..SacConfig::default() };
         let e = refused(RlConfig { sac, ..default });
         assert!(e.starts_with("sac.discount is NaN; expected"), "{e}");

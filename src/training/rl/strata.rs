@@ -55,6 +55,11 @@ impl Strata {
         push(&mut self.outcomes[stratum], parked, OUTCOMES);
     }
 
+    /// Whether it can be: as read from a file.
+    pub fn is_sound(&self) -> bool {
+        self.recent.iter().all(|s| *s < Stratum::COUNT)
+    }
+
     /// How much success falls short of what is wanted.
     fn weight(&self, stratum: usize) -> f64 {
         let outcomes = &self.outcomes[stratum];

@@ -46,6 +46,9 @@ pub fn train(
     let path = checkpoint_path(out);
     let mut trainer = match (begin, path.exists()) {
         (Begin::Anew, true) => return Err(TrainingError::CheckpointInTheWay(path)),
+        (Begin::Resume, true) if !out.exists() => {
+            return Err(TrainingError::PolicyGone(out.to_owned()));
+        }
         (Begin::Resume, true) => Trainer::resumed(course, config, &path, device)?,
         (_, false) => Trainer::new(course, config, device),
     };
@@ -154,7 +157,7 @@ impl Trainer {
     ) -> Result<Self, TrainingError> {
         let (state, agent, replay) =
             checkpoint::read(path, device).map_err(TrainingError::Checkpoint)?;
-        // More episodes only make it longer.
+        // More episodes only make it longer (and leave a point of the curve where it had ended).
         let same = RlConfig { episodes: config.episodes, ..state.log.config.clone() };
         if same != *config || state.log.course != course {
             return Err(TrainingError::OtherCheckpoint(path.to_owned()));
