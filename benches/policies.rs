@@ -68,6 +68,8 @@ impl Side {
 }
 
 fn bench(c: &mut Criterion) {
+    // As every program does that drives or trains policies.
+    n3p::training::single_threaded();
     let mut rng = rng(common::SEED, Stream::Policy, 0);
     let mut group = c.benchmark_group("environment");
     group.throughput(Throughput::Elements(ENVIRONMENTS));

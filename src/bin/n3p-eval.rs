@@ -12,6 +12,7 @@ use n3p::evaluation::suite::{self, SuiteConfig};
 use n3p::evaluation::{Case, Method, MethodSettings, Models, Outputs, metrics};
 use n3p::progress;
 use n3p::rl::source::PolicySource;
+use n3p::training;
 use n3p::vehicle::Vehicle;
 use n3p::world::{Level, ParkingType};
 
@@ -75,6 +76,7 @@ struct Args {
 }
 
 fn main() -> ExitCode {
+    training::single_threaded();
     cli::run(|| evaluate(&cli::parse()))
 }
 

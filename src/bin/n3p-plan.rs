@@ -17,6 +17,7 @@ use n3p::evaluation::{
 use n3p::files::{check_writable, reason, write_whole};
 use n3p::planners::Problem;
 use n3p::rl::source::PolicySource;
+use n3p::training;
 use n3p::world::Scene;
 
 /// Plans a path for one parking scene.
@@ -106,6 +107,7 @@ impl Limits {
 }
 
 fn main() -> ExitCode {
+    training::single_threaded();
     cli::run(|| plan(&cli::parse()))
 }
 
