@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::TrainingError;
-use crate::files::read_toml;
+use super::settings::{self, real, whole};
 
 /// How far off an output is, per normalised component.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -104,28 +104,14 @@ impl Default for MlpConfig {
 impl MlpConfig {
     /// Reads and checks a TOML file; absent settings keep their defaults.
     pub fn read(path: &Path) -> Result<Self, TrainingError> {
-        let config: Self = read_toml(path)?;
-        config.validate().map_err(|e| TrainingError::ConfigFile {
-            path: path.to_owned(),
-            problem: e.to_string(),
-        })?;
-        Ok(config)
+        settings::read(path, Self::validate)
     }
 
     /// Checks every setting.
     pub fn validate(&self) -> Result<(), TrainingError> {
-        let check = |field, ok: bool, value: String, expected| {
-            if ok { Ok(()) } else { Err(TrainingError::Config { field, value, expected }) }
-        };
-        let real = |field, v: f64, range: std::ops::RangeInclusive<f64>, expected| {
-            check(field, range.contains(&v), v.to_string(), expected)
-        };
-        let whole = |field, v: usize, range: std::ops::RangeInclusive<usize>, expected| {
-            check(field, range.contains(&v), v.to_string(), expected)
-        };
-        whole("epochs", self.epochs, 1..=100_000, "a whole number from 1 to 100000")?;
-        whole("batch", self.batch, 1..=65_536, "a whole number from 1 to 65536")?;
-        whole("patience", self.patience, 1..=100_000, "a whole number from 1 to 100000")?;
+        whole("epochs", self.epochs, 100_000, "a whole number from 1 to 100000")?;
+        whole("batch", self.batch, 65_536, "a whole number from 1 to 65536")?;
+        whole("patience", self.patience, 100_000, "a whole number from 1 to 100000")?;
         real("learning_rate", self.learning_rate, 1e-8..=1.0, "a number from 1e-8 to 1")?;
         real("weight_decay", self.weight_decay, 0.0..=1.0, "a number from 0 to 1")?;
         real("huber_delta", self.huber_delta, 1e-4..=100.0, "a number from 1e-4 to 100")?;

@@ -16,6 +16,7 @@ pub mod mlp;
 mod mlp_config;
 pub mod quality;
 pub mod rl;
+mod settings;
 mod targets;
 
 pub use mlp_config::{Loss, MlpConfig, Schedule, Targets, Validation};

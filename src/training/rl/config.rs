@@ -4,10 +4,10 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::files::read_toml;
 use crate::rl::parking_env::EnvConfig;
 use crate::rl::sac::SacConfig;
 use crate::training::TrainingError;
+use crate::training::settings::{self, check, real, whole};
 use crate::vehicle::Vehicle;
 use crate::world::generate::GeneratorConfig;
 
@@ -64,25 +64,11 @@ impl Default for RlConfig {
 impl RlConfig {
     /// Reads and checks a TOML file; absent settings keep their defaults.
     pub fn read(path: &Path) -> Result<Self, TrainingError> {
-        let config: Self = read_toml(path)?;
-        config.validate().map_err(|e| TrainingError::ConfigFile {
-            path: path.to_owned(),
-            problem: e.to_string(),
-        })?;
-        Ok(config)
+        settings::read(path, Self::validate)
     }
 
     /// Checks every setting.
     pub fn validate(&self) -> Result<(), TrainingError> {
-        let check = |field, ok: bool, value: String, expected| {
-            if ok { Ok(()) } else { Err(TrainingError::Config { field, value, expected }) }
-        };
-        let real = |field, v: f64, range: std::ops::RangeInclusive<f64>, expected| {
-            check(field, range.contains(&v), v.to_string(), expected)
-        };
-        let whole = |field, v: usize, most: usize, expected| {
-            check(field, (1..=most).contains(&v), v.to_string(), expected)
-        };
         whole("episodes", self.episodes, 10_000_000, "a whole number from 1 to 10000000")?;
         whole("environments", self.environments, 1024, "a whole number from 1 to 1024")?;
         whole("warm_up", self.warm_up, 10_000_000, "a whole number from 1 to 10000000")?;
