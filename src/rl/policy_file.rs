@@ -68,8 +68,7 @@ pub fn load(path: &Path) -> Result<(PolicyHeader, Actor), ArtefactError> {
 
 fn decode(bytes: &[u8]) -> Result<(PolicyHeader, Actor), Fault> {
     let shapes = Role::Actor.shapes();
-    let values = shapes.values().map(|s| s.iter().product::<usize>() as u64).sum::<u64>();
-    let (json, tensors) = tensor_file::decode(bytes, VERSION, 4 * values)?;
+    let (json, tensors) = tensor_file::decode(bytes, VERSION)?;
     if Content::of(&json) != Content::Policy {
         return Err(Fault::Selector);
     }

@@ -24,7 +24,7 @@ pub struct Transition {
 const OBSERVATION: usize = 2 * BEAMS + 4 * TARGET + MASK;
 
 /// Bytes of a packed transition.
-pub const PACKED: usize = 2 * OBSERVATION + 4 * 3 + 1;
+const PACKED: usize = 2 * OBSERVATION + 4 * 3 + 1;
 
 /// The last transitions, up to a capacity.
 #[derive(Clone, Debug)]

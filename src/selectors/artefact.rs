@@ -97,8 +97,8 @@ pub enum Fault {
     },
     /// Trained for another car.
     #[error(
-        "trained for another vehicle: its {field} is {model}, wanted {wanted} (it would serve one \
-         that lies within its own and turns as tightly); train for this vehicle: {command}"
+        "trained for another vehicle: its {field} is {model}, wanted {wanted}; \
+         train for this vehicle: {command}"
     )]
     OtherVehicle {
         /// Name of the vehicle's field.

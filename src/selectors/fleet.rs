@@ -76,7 +76,7 @@ impl FleetSelector {
     }
 
     fn decode(path: &Path, bytes: &[u8]) -> Result<Self, Fault> {
-        let (json, tensors) = tensor_file::decode(bytes, VERSION, 0)?;
+        let (json, tensors) = tensor_file::decode(bytes, VERSION)?;
         let damaged = |e: String| Fault::Header(e);
         let header: FleetHeader =
             serde_json::from_str(&json).map_err(|e| damaged(e.to_string()))?;

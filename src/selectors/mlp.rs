@@ -171,7 +171,7 @@ impl PoseSelector for MlpSelector {
 }
 
 fn decode(bytes: &[u8]) -> Result<(MlpHeader, Vec<LayerWeights>), Fault> {
-    let (json, tensors) = tensor_file::decode(bytes, VERSION, parameter_bytes())?;
+    let (json, tensors) = tensor_file::decode(bytes, VERSION)?;
     if Content::of(&json) == Content::Policy {
         return Err(Fault::Policy);
     }
@@ -186,11 +186,6 @@ fn decode(bytes: &[u8]) -> Result<(MlpHeader, Vec<LayerWeights>), Fault> {
     });
     let layers = layers.collect::<Result<Vec<_>, Fault>>()?;
     Ok((header, layers))
-}
-
-/// Size of all weights and biases, bytes.
-fn parameter_bytes() -> u64 {
-    LAYERS.windows(2).map(|size| 4 * (size[0] * size[1] + size[1]) as u64).sum()
 }
 
 fn check_header(header: &MlpHeader) -> Result<(), String> {

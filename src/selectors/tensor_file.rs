@@ -64,14 +64,9 @@ struct VersionOnly {
     format_version: u32,
 }
 
-/// The header's text and the tensors of a file, its checksum and version checked. `data_len`:
-/// bytes of tensors that a whole file holds, for the message about one that is cut off.
-pub fn decode(
-    bytes: &[u8],
-    version: u32,
-    data_len: u64,
-) -> Result<(String, SafeTensors<'_>), Fault> {
-    let (data_at, entry) = metadata(bytes, data_len)?;
+/// The header's text and the tensors of a file, its checksum and version checked.
+pub fn decode(bytes: &[u8], version: u32) -> Result<(String, SafeTensors<'_>), Fault> {
+    let (data_at, entry) = metadata(bytes)?;
     let versioned: Versioned =
         serde_json::from_str(&entry).map_err(|e| Fault::Header(e.to_string()))?;
     let found = versioned.header.format_version;
@@ -88,7 +83,7 @@ pub fn decode(
 }
 
 /// Where the tensor data begin, and the metadata entry of this program.
-fn metadata(bytes: &[u8], data_len: u64) -> Result<(usize, String), Fault> {
+fn metadata(bytes: &[u8]) -> Result<(usize, String), Fault> {
     const LENGTH: usize = 8;
     if bytes.is_empty() {
         return Err(Fault::Empty);
@@ -112,7 +107,7 @@ fn metadata(bytes: &[u8], data_len: u64) -> Result<(usize, String), Fault> {
             Ok((data_at as usize, entry.ok_or(Fault::NotAModel)?.clone()))
         }
         Err(SafeTensorError::MetadataIncompleteBuffer) => {
-            let expected = data_at + data_len;
+            let expected = data_at + data_len(&bytes[LENGTH..data_at as usize]);
             if expected == got {
                 return Err(Fault::Header("the tensors do not fill the file".to_owned()));
             }
@@ -120,6 +115,13 @@ fn metadata(bytes: &[u8], data_len: u64) -> Result<(usize, String), Fault> {
         }
         Err(e) => Err(Fault::Header(e.to_string())),
     }
+}
+
+/// Bytes of tensors that a file's own header asks for.
+fn data_len(header: &[u8]) -> u64 {
+    let header: serde_json::Value = serde_json::from_slice(header).unwrap_or_default();
+    let tensors = header.as_object().into_iter().flatten();
+    tensors.filter_map(|(_, tensor)| tensor["data_offsets"][1].as_u64()).max().unwrap_or(0)
 }
 
 /// The parts of `{"sha256":"…","header":…}`.
@@ -155,7 +157,7 @@ impl Content {
 
     /// What a file holds; [`Content::Mlp`] where that cannot be told.
     pub fn of_file(bytes: &[u8]) -> Self {
-        let entry = metadata(bytes, 0).ok();
+        let entry = metadata(bytes).ok();
         let header = entry.as_ref().and_then(|(_, entry)| split_entry(entry));
         header.map_or(Self::Mlp, |(_, header)| Self::of(header))
     }

@@ -13,7 +13,7 @@ use crate::rl::courses::Stratum;
 use crate::rl::encoding::InputScale;
 use crate::rl::network::{Parameters, Role};
 use crate::rl::parking_env::Progress;
-use crate::rl::replay::{PACKED, Replay};
+use crate::rl::replay::Replay;
 use crate::rl::sac::{Parts, Sac};
 use crate::selectors::artefact::{self, ArtefactError, Fault};
 use crate::selectors::tensor_file::{self, NamedTensor};
@@ -150,7 +150,7 @@ pub fn read(path: &Path, device: &Device) -> Result<(State, Sac, Replay), Artefa
 }
 
 fn decode(bytes: &[u8], device: &Device) -> Result<(State, Sac, Replay), Fault> {
-    let (json, tensors) = tensor_file::decode(bytes, VERSION, PACKED as u64)?;
+    let (json, tensors) = tensor_file::decode(bytes, VERSION)?;
     let damaged = |e: String| Fault::Header(e);
     let candle = |e: candle_core::Error| Fault::Header(e.to_string());
     let state: State = serde_json::from_str(&json).map_err(|e| damaged(e.to_string()))?;
