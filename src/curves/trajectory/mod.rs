@@ -174,15 +174,15 @@ impl Trajectory {
     /// steering angle or its rate changes. So between two of them all three are constant while
     /// the car drives, and at standstill the wheels turn steadily.
     ///
-    /// A multiple of `step` is left out where it would be nearer than 2 % of a step to another
-    /// kind of moment. `step` must be positive.
+    /// A multiple of `step` is left out where it would be nearer than 1 % of a step to another
+    /// kind of moment; so moments are at most 102 % of a step apart. `step` must be positive.
     pub fn sample(&self, step: f64) -> Vec<Moment> {
         let changes: Vec<f64> = self.phases.iter().map(|p| p.time).chain([self.end.time]).collect();
         let is_apart = |time: f64| {
             let after = changes.partition_point(|&c| c <= time);
             changes[after.saturating_sub(1)..changes.len().min(after + 1)]
                 .iter()
-                .all(|c| (c - time).abs() >= 0.02 * step)
+                .all(|c| (c - time).abs() >= 0.01 * step)
         };
         // Divided, not multiplied: the third moment at 0.05 s is 0.15, not 0.15000000000000002.
         let per_second = 1.0 / step;
@@ -256,6 +256,20 @@ mod tests {
         assert!((stopping.standing_s - 5.0 * left / 0.6).abs() < 1e-9);
         assert_eq!(stopping.max_backward_speed_mps, 1.0);
         assert!((stopping.max_forward_speed_mps - 3.0_f64.sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn gaps_between_samples_stay_within_two_per_cent_of_a_step() {
+        // The wheels turn until 1.5 % before a multiple of the step; the car drives until 1.5 %
+        // after the next one.
+        let (step, rate) = (0.05, 0.6);
+        let curvature = Vehicle::default().curvature(rate * (2.0 - 0.015) * step);
+        let ramp = 1.03 * step;
+        let path = Path::new(Pose::default(), [Segment { curvature, length: ramp * ramp }]);
+        let limits = TrajectoryLimits { steer_rate: rate, ..Default::default() };
+        let t = Trajectory::new(&path, &Vehicle::default(), &limits).unwrap();
+        let times: Vec<f64> = t.sample(step).iter().map(|m| m.time).collect();
+        assert!(times.windows(2).all(|w| w[1] - w[0] <= 1.02 * step), "{times:?}");
     }
 
     #[test]
