@@ -18,9 +18,15 @@ impl Frame {
     /// The frame that is the world itself.
     pub const WORLD: Frame = Frame { origin_in_world: Pose::new(0.0, 0.0, 0.0), mirrored: false };
 
-    /// A world point, seen from this frame.
-    pub fn local_from_world_point(&self, p: Vec2) -> Vec2 {
-        self.flip_point(self.origin_in_world.point_to_local(p))
+    /// How world points are seen from this frame. Its sine and cosine are taken only once.
+    pub fn view(&self) -> impl Fn(Vec2) -> Vec2 + use<> {
+        let Self { origin_in_world: origin, mirrored } = *self;
+        let (sin, cos) = origin.sin_cos();
+        let side = if mirrored { -1.0 } else { 1.0 };
+        move |p| {
+            let (dx, dy) = (p.x - origin.x, p.y - origin.y);
+            Vec2::new(cos * dx + sin * dy, side * (cos * dy - sin * dx))
+        }
     }
 
     /// A point of this frame, in the world.
@@ -65,6 +71,8 @@ mod tests {
             let pose = Pose::new(5e5 + 3.0, -2e5 + 1.0, -3.0);
             let back = frame.world_from_local(frame.local_from_world(pose));
             assert!(back.distance(pose) < 1e-9);
+            let point = frame.view()(pose.position());
+            assert!((point - frame.local_from_world(pose).position()).norm() < 1e-9);
             assert!(signed_angle(back.heading, pose.heading).abs() < 1e-12);
         }
     }
@@ -73,5 +81,6 @@ mod tests {
     fn a_mirrored_frame_sees_left_as_right() {
         let frame = Frame { origin_in_world: Pose::default(), mirrored: true };
         assert_eq!(frame.local_from_world(Pose::new(1.0, 2.0, 0.5)), Pose::new(1.0, -2.0, -0.5));
+        assert_eq!(frame.view()(Vec2::new(1.0, 2.0)), Vec2::new(1.0, -2.0));
     }
 }

@@ -47,7 +47,11 @@ const MAX_SHIFT: f64 = 1.0;
 /// `obstacles` in the spot frame. Several cells are maximal when an obstacle can either
 /// shorten the lane or narrow it; none of those returned contains another.
 pub fn abstractions(obstacles: &Obstacles, kind: ParkingType, grid: &Grid) -> Vec<Abstraction> {
-    let edges: Vec<(Vec2, Vec2)> = obstacles.edges().collect();
+    // What could enter a cell, or bounds the spot.
+    let floor = -grid.lane_boundary(kind);
+    let top = grid.lane_boundary(kind) + MAX_SHIFT + grid.lane_width.max;
+    let is_near = |&(a, b): &(Vec2, Vec2)| a.y.max(b.y) > floor && a.y.min(b.y) < top;
+    let edges: Vec<(Vec2, Vec2)> = obstacles.edges().filter(is_near).collect();
     let mut found = Vec::new();
     let low = bottom_shift(&edges, kind, grid);
     for shift in [low, protrusion(obstacles, kind, grid).max(low)] {
@@ -74,7 +78,7 @@ fn at_shift(
     let Some(spot_width) = spot_width(edges, floor, boundary) else { return Vec::new() };
     let axis = &grid.dead_end;
     // The lane's width for every dead end of the grid: nothing enters [−back, D].
-    let mut widths = vec![f64::INFINITY; axis.len()];
+    let mut widths = vec![grid.lane_width.max; axis.len()];
     for &(a, b) in edges {
         let Some((a, b)) = clip(a, b, 1, boundary + TOUCH, f64::INFINITY) else { continue };
         let (x_min, x_max) = (a.x.min(b.x), a.x.max(b.x));
@@ -93,8 +97,7 @@ fn at_shift(
         }
     }
     let mut found: Vec<Abstraction> = Vec::new();
-    for (i, &width) in widths.iter().enumerate().rev() {
-        let lane_width = width.min(grid.lane_width.max);
+    for (i, &lane_width) in widths.iter().enumerate().rev() {
         let found_at = Cell { kind, lane_width, spot_width, dead_end: axis.value(i) };
         let Some(index) = grid.floor(&found_at) else { continue };
         let cell = grid.cell(kind, index);

@@ -17,13 +17,6 @@ impl Obstacles {
         self.polygons.is_empty() && self.points.is_empty()
     }
 
-    /// Every point mapped by `f`.
-    pub fn map(mut self, f: impl Fn(Vec2) -> Vec2) -> Self {
-        self.polygons.iter_mut().for_each(|p| *p = p.map(&f));
-        self.points.iter_mut().for_each(|p| *p = f(*p));
-        self
-    }
-
     /// Every polygon edge, and every point as an edge of length zero.
     pub fn edges(&self) -> impl Iterator<Item = (Vec2, Vec2)> + '_ {
         let points = self.points.iter().map(|&p| (p, p));

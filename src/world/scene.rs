@@ -15,7 +15,7 @@ use serde_json::{Value, error::Category};
 
 use super::{Obstacles, ParkingType, tpcap};
 use crate::files::{reason, write_whole};
-use crate::geometry::{Frame, Polygon, Pose, Vec2};
+use crate::geometry::{Polygon, Pose, Vec2};
 use crate::vehicle::Vehicle;
 
 /// A parking scene in its own (world) frame; metres and radians.
@@ -260,12 +260,8 @@ impl Scene {
         self.geometry_by(|v| v)
     }
 
-    /// [`Scene::geometry`], seen from `frame`.
-    pub fn geometry_seen_from(&self, frame: &Frame) -> Obstacles {
-        self.geometry_by(|v| frame.local_from_world_point(v))
-    }
-
-    fn geometry_by(&self, map: impl Fn(Vec2) -> Vec2) -> Obstacles {
+    /// [`Scene::geometry`] with every point mapped by `map`.
+    pub fn geometry_by(&self, map: impl Fn(Vec2) -> Vec2) -> Obstacles {
         let vec = |&[x, y]: &[f64; 2]| map(Vec2::new(x, y));
         Obstacles {
             polygons: self

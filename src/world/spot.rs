@@ -51,9 +51,12 @@ impl Precision {
     }
 }
 
-/// Exact for steps that are powers of two.
+/// The nearest multiple of `step`, a power of two, for `v` of up to 2⁵¹ steps.
 fn round_to(v: f64, step: f64) -> f64 {
-    (v / step).round() * step
+    // From here to twice this there are multiples of the step and nothing between. Two sums, where
+    // rounding would be a call.
+    let multiples = step * 1.5 * (1_u64 << 52) as f64;
+    (v + multiples) - multiples
 }
 
 /// A scene seen from its planning frame.
@@ -123,7 +126,8 @@ fn around_goal(scene: &Scene) -> Scene {
 }
 
 fn seen(scene: &Scene, frame: Frame, kind: Option<ParkingType>, precision: Precision) -> SpotGuess {
-    let obstacles = scene.geometry_seen_from(&frame).map(|p| precision.point(p));
+    let view = frame.view();
+    let obstacles = scene.geometry_by(|p| precision.point(view(p)));
     SpotGuess { frame, kind, obstacles }
 }
 
@@ -195,8 +199,9 @@ pub fn bounds_in_frame(
     frame: &Frame,
     precision: Precision,
 ) -> [Vec2; 4] {
+    let view = frame.view();
     let mut corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
-        .map(|(x, y)| precision.point(frame.local_from_world_point(Vec2::new(x, y))));
+        .map(|(x, y)| precision.point(view(Vec2::new(x, y))));
     if frame.mirrored {
         corners.reverse();
     }

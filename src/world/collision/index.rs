@@ -30,7 +30,13 @@ struct Cluster {
 
 impl EdgeIndex {
     pub fn new(obstacles: &Obstacles) -> Self {
-        let mut index = Self::default();
+        let vertices = obstacles.polygons.iter().map(|p| p.vertices().len()).sum::<usize>();
+        let (polygons, edges) = (obstacles.polygons.len(), vertices + obstacles.points.len());
+        let mut index = Self {
+            clusters: Vec::with_capacity(polygons + edges / CLUSTER + 1),
+            polygons: Vec::with_capacity(polygons),
+            edges: Vec::with_capacity(edges),
+        };
         for polygon in &obstacles.polygons {
             let edges = index.add(polygon.edges());
             index.polygons.push(Cluster { aabb: polygon.aabb(), edges });
