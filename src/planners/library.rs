@@ -111,6 +111,12 @@ pub struct Verdicts {
 }
 
 impl Verdicts {
+    /// For another environment; buffers stay.
+    pub fn clear(&mut self) {
+        self.free.clear();
+        self.suspect = None;
+    }
+
     fn is_free(&mut self, library: &Library, index: usize, problem: &Problem) -> bool {
         // The library may have grown.
         self.free.resize(library.len(), None);
@@ -144,6 +150,15 @@ pub struct LibrarySearch {
     analytic: AnalyticExpansion,
 }
 
+/// One problem being looked up.
+pub struct LookUp<'a> {
+    search: &'a mut LibrarySearch,
+    library: &'a Library,
+    verdicts: &'a mut Verdicts,
+    problem: &'a Problem,
+    model: &'a CostModel,
+}
+
 /// A manoeuvre and its estimated cost, ordered by cost, then by index: the bits of the cost above
 /// those of the index. Floats that are not negative are ordered like their bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -170,77 +185,17 @@ impl Candidate {
 }
 
 impl LibrarySearch {
-    /// The first plan of `problem`, in order of estimated cost, that is free and costs less
-    /// than `bound`.
-    pub fn plan(
-        &mut self,
-        library: &Library,
-        problem: &Problem,
-        model: &CostModel,
+    /// Ranks all manoeuvres by which a plan of `problem` may cost less than `bound`. The `verdicts`
+    /// are those of its environment, or new.
+    pub fn look_up<'a>(
+        &'a mut self,
+        library: &'a Library,
+        verdicts: &'a mut Verdicts,
+        problem: &'a Problem,
+        model: &'a CostModel,
         bound: f64,
-    ) -> Option<LibraryPlan> {
+    ) -> LookUp<'a> {
         debug_assert!(library.fits(problem));
-        self.rank(library, problem, model, bound);
-        let base = BodyFrame::new(problem.goal);
-        let mut suspect = None;
-        let is_free = |i: usize| library.manoeuvres[i].is_free(&base, problem, &mut suspect);
-        self.first(library, is_free, problem, model, bound)
-    }
-
-    /// The same for one of many starts in one environment, whose `verdicts` are kept.
-    pub fn plan_again(
-        &mut self,
-        library: &Library,
-        verdicts: &mut Verdicts,
-        problem: &Problem,
-        model: &CostModel,
-        bound: f64,
-    ) -> Option<LibraryPlan> {
-        debug_assert!(library.fits(problem));
-        self.rank(library, problem, model, bound);
-        self.first(library, |i| verdicts.is_free(library, i, problem), problem, model, bound)
-    }
-
-    /// The first plan of the queue.
-    fn first(
-        &mut self,
-        library: &Library,
-        mut is_free: impl FnMut(usize) -> bool,
-        problem: &Problem,
-        model: &CostModel,
-        bound: f64,
-    ) -> Option<LibraryPlan> {
-        let mut free = std::mem::take(&mut self.free);
-        free.clear();
-        let mut plan = None;
-        while let Some(Reverse(candidate)) = self.queue.pop() {
-            if is_free(candidate.index()) {
-                free.push(candidate);
-                let bound = bound.min(candidate.window());
-                plan = self.join(library, candidate.index(), problem, model, bound);
-                if plan.is_some() {
-                    break;
-                }
-            }
-        }
-        // Rather a long way round than none.
-        let again = || {
-            free.iter()
-                .filter(|c| c.window() < bound)
-                .find_map(|c| self.join(library, c.index(), problem, model, bound))
-        };
-        plan = plan.or_else(again);
-        self.free = free;
-        plan
-    }
-
-    /// The manoeuvres found free in the last call, in the order they were tried.
-    pub fn tried(&self) -> impl Iterator<Item = usize> + '_ {
-        self.free.iter().map(|c| c.index())
-    }
-
-    /// Fills the queue with all manoeuvres that may cost less than `bound`.
-    fn rank(&mut self, library: &Library, problem: &Problem, model: &CostModel, bound: f64) {
         let goal = problem.start.relative(problem.goal);
         let mut begins = self.approaches.view(&library.begins, goal, &problem.vehicle, model);
         let mut queue = std::mem::take(&mut self.queue).into_vec();
@@ -252,22 +207,79 @@ impl LibrarySearch {
             }
         }
         self.queue = BinaryHeap::from(queue);
+        self.free.clear();
+        LookUp { search: self, library, verdicts, problem, model }
     }
 
-    /// The plan through a free manoeuvre, if a free curve joins it within `bound`.
-    fn join(
+    /// The first plan of `problem`, in order of estimated cost, that is free and costs less
+    /// than `bound`; rather a long way round than none.
+    pub fn plan(
         &mut self,
         library: &Library,
-        manoeuvre: usize,
+        verdicts: &mut Verdicts,
         problem: &Problem,
         model: &CostModel,
         bound: f64,
     ) -> Option<LibraryPlan> {
+        let mut look_up = self.look_up(library, verdicts, problem, model, bound);
+        look_up.next(bound, usize::MAX).or_else(|| look_up.long_way(bound, usize::MAX))
+    }
+
+    /// The manoeuvres found free in the last call, in the order they were tried.
+    pub fn tried(&self) -> impl Iterator<Item = usize> + '_ {
+        self.free.iter().map(|c| c.index())
+    }
+}
+
+impl LookUp<'_> {
+    /// The next plan in order of estimated cost that is free, costs less than `bound` and little
+    /// more than estimated. Goes on after as many free manoeuvres as are asked for in `tries`, none
+    /// of which could be joined, when called again.
+    pub fn next(&mut self, bound: f64, tries: usize) -> Option<LibraryPlan> {
+        let last = self.search.free.len().saturating_add(tries);
+        while self.search.free.len() < last {
+            let Reverse(candidate) = self.search.queue.pop()?;
+            if candidate.estimate() >= bound {
+                // So do all others.
+                self.search.queue.clear();
+                return None;
+            }
+            if self.verdicts.is_free(self.library, candidate.index(), self.problem) {
+                self.search.free.push(candidate);
+                let plan = self.join(candidate, bound.min(candidate.window()));
+                if plan.is_some() {
+                    return plan;
+                }
+            }
+        }
+        None
+    }
+
+    /// The first plan by one of the first `tries` free manoeuvres that [`LookUp::next`] could not
+    /// join, whose curve may be as long as `bound` allows.
+    pub fn long_way(&mut self, bound: f64, tries: usize) -> Option<LibraryPlan> {
+        let tries = tries.min(self.search.free.len());
+        (0..tries).find_map(|i| {
+            let candidate = self.search.free[i];
+            if candidate.window() < bound { self.join(candidate, bound) } else { None }
+        })
+    }
+
+    /// The plan through a free manoeuvre, if a free curve joins it within `bound`.
+    fn join(&mut self, candidate: Candidate, bound: f64) -> Option<LibraryPlan> {
+        let Self { library, problem, model, .. } = *self;
+        let manoeuvre = candidate.index();
         let entry = &library.manoeuvres[manoeuvre].entry;
         let preparatory = problem.goal.compose(entry.pose);
         let (departure, bound) = (entry.departure(), bound - entry.cost());
-        let (word, cost) =
-            self.analytic.curve(problem.start, preparatory, departure, bound, problem, model)?;
+        let (word, cost) = self.search.analytic.curve(
+            problem.start,
+            preparatory,
+            departure,
+            bound,
+            problem,
+            model,
+        )?;
         let mut path = Path::new(problem.start, word.segments().iter().copied());
         path.extend(entry.rest.iter().copied());
         Some(LibraryPlan { path, cost: cost + entry.cost(), manoeuvre, preparatory })
@@ -333,7 +345,10 @@ mod tests {
         for kind in ParkingType::ALL {
             for problem in problems(kind, Level::Complex, 2) {
                 let library = library(kind, *problem.collision.footprint());
-                let mut within = |bound| search.plan(&library, &problem, &config.cost, bound);
+                let mut within = |bound| {
+                    let mut new = Verdicts::default();
+                    search.plan(&library, &mut new, &problem, &config.cost, bound)
+                };
                 let Some(plan) = within(f64::INFINITY) else { continue };
                 found += 1;
                 let cost = config.cost.path(&problem.vehicle, &plan.path.segments);
@@ -343,10 +358,17 @@ mod tests {
                 assert_eq!(within(f64::INFINITY).as_ref(), Some(&plan));
                 let mut verdicts = Verdicts::default();
                 for bound in [less, f64::INFINITY, f64::INFINITY] {
-                    let again =
-                        search.plan_again(&library, &mut verdicts, &problem, &config.cost, bound);
-                    assert_eq!(again, search.plan(&library, &problem, &config.cost, bound));
+                    let mut new = Verdicts::default();
+                    let [again, anew] = [&mut verdicts, &mut new]
+                        .map(|v| search.plan(&library, v, &problem, &config.cost, bound));
+                    assert_eq!(again, anew);
                 }
+                // In parts as at once, but for the long ways round.
+                let mut new = Verdicts::default();
+                let mut look_up =
+                    search.look_up(&library, &mut new, &problem, &config.cost, f64::INFINITY);
+                let parts = (0..library.len()).find_map(|_| look_up.next(f64::INFINITY, 1));
+                assert!(parts.is_none_or(|p| p == plan));
                 let near = |s: &crate::curves::Sample| s.pose.distance(plan.preparatory) < 0.03;
                 assert!(plan.path.sample(0.05).iter().any(near));
                 assert!(PlanResult::certified(&problem, plan.path, 0).outcome.is_ok());

@@ -194,7 +194,7 @@ impl Route {
     pub fn explanation(self) -> &'static str {
         match self {
             Route::Library => "a known manoeuvre, joined by one curve; no search",
-            Route::Direct => "curves by way of a preparatory pose; no search",
+            Route::Direct => "Reeds-Shepp curves alone; no search",
             Route::Searched => "a search by way of a preparatory pose",
             Route::Fallback => "a full search: no known manoeuvre or pose fits here",
             Route::NoLane => "a full search: no free lane of the model's smallest size by the spot",

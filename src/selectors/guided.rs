@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::curves::{Path, Segment};
 use crate::geometry::{Pose, Vec2};
 use crate::planners::hybrid_astar::{Entry, GoalSet, Leg};
-use crate::planners::library::{Library, LibraryPlan, LibrarySearch};
+use crate::planners::library::{Library, LibrarySearch, Verdicts};
 use crate::planners::{
     Budget, Guidance, HybridAStar, HybridAStarConfig, NoPath, PlanResult, Planner, Problem, Route,
 };
@@ -26,6 +26,15 @@ use super::{Features, PoseSelector};
 /// Expansions that the paper's two legs may spend, so that a pose just beside the feasible
 /// ones does not use up what the full search needs.
 const LEG_EXPANSIONS: usize = 5_000;
+/// Known manoeuvres, free in the scene, that `n3p` tries to join before it asks for the curve
+/// straight to the goal, and then once more for something cheaper: most plans take the first.
+const FIRST_TRIES: usize = 8;
+/// Those it tries where there is no such curve. Each takes some microseconds; generated scenes need
+/// 24 of them at most.
+const TRIES: usize = 64;
+/// Those that it tries to join by a long way round, where no other plan was found.
+const LONG_WAYS: usize = 8;
+
 /// What `n3p` tries before it searches. The paper's rows have no such settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -73,6 +82,7 @@ pub struct GuidedPlanner {
     /// The selector's manoeuvres, prepared for the parking types and footprints met so far.
     libraries: Vec<(ParkingType, Library)>,
     library_search: LibrarySearch,
+    verdicts: Verdicts,
 }
 
 impl GuidedPlanner {
@@ -97,10 +107,16 @@ impl GuidedPlanner {
         selector: Arc<dyn PoseSelector>,
         config: HybridAStarConfig,
     ) -> Self {
-        let hars = HybridAStar::new(config);
-        let (libraries, library_search) = (Vec::new(), LibrarySearch::default());
-        let (name, poses) = (name.to_owned(), Vec::new());
-        Self { name, strategy, selector, hars, poses, libraries, library_search }
+        Self {
+            name: name.to_owned(),
+            strategy,
+            selector,
+            hars: HybridAStar::new(config),
+            poses: Vec::new(),
+            libraries: Vec::new(),
+            library_search: LibrarySearch::default(),
+            verdicts: Verdicts::default(),
+        }
     }
 
     /// Asks for up to `k` poses for an abstraction of `problem`, in the planning frame.
@@ -114,19 +130,49 @@ impl GuidedPlanner {
         }
     }
 
-    /// The best plan by a known manoeuvre.
-    fn look_up(&mut self, problem: &Problem) -> Option<LibraryPlan> {
+    /// The plan by a manoeuvre of the library with this number, or by one curve straight to the
+    /// goal where that costs less or no manoeuvre fits.
+    fn look_up(
+        &mut self,
+        library: usize,
+        problem: &Problem,
+        found: Option<Abstraction>,
+    ) -> Option<(Path, Guidance)> {
+        let Self { libraries, library_search, verdicts, hars, .. } = self;
+        let cost = hars.config().cost;
+        verdicts.clear();
+        let any = f64::INFINITY;
+        let mut look_up =
+            library_search.look_up(&libraries[library].1, verdicts, problem, &cost, any);
+        let plan = look_up.next(any, FIRST_TRIES);
+        let mut direct = None;
+        let plan = plan.or_else(|| {
+            direct = hars.direct(problem, problem.start, &hars.goal_set(problem));
+            match &direct {
+                Some(leg) => look_up.next(leg.cost, FIRST_TRIES),
+                None => look_up.next(any, TRIES).or_else(|| look_up.long_way(any, LONG_WAYS)),
+            }
+        });
+        let (path, preparatory, route) = match (plan, direct) {
+            (Some(plan), _) => (plan.path, Some(plan.preparatory), Route::Library),
+            (None, Some(leg)) => (leg.path, None, Route::Direct),
+            (None, None) => return None,
+        };
+        Some((path, Guidance { abstraction: found, preparatory, route }))
+    }
+
+    /// The number of the library for `problem`, prepared if need be; `None` where nothing is known.
+    fn library(&mut self, problem: &Problem) -> Option<usize> {
         let kind = problem.kind?;
-        let (vehicle, cost) = (&problem.vehicle, &self.hars.config().cost);
         let fits = |(k, l): &(ParkingType, Library)| *k == kind && l.fits(problem);
         let at = self.libraries.iter().position(fits).unwrap_or_else(|| {
-            let (manoeuvres, footprint) =
-                (self.selector.manoeuvres(kind, vehicle), *problem.collision.footprint());
-            self.libraries.push((kind, Library::new(&manoeuvres, vehicle, footprint, cost)));
+            let (vehicle, footprint) = (&problem.vehicle, *problem.collision.footprint());
+            let manoeuvres = self.selector.manoeuvres(kind, vehicle);
+            let library = Library::new(&manoeuvres, vehicle, footprint, &self.hars.config().cost);
+            self.libraries.push((kind, library));
             self.libraries.len() - 1
         });
-        let library = &self.libraries[at].1;
-        self.library_search.plan(library, problem, cost, f64::INFINITY)
+        (!self.libraries[at].1.is_empty()).then_some(at)
     }
 
     fn plan_paper(
@@ -172,15 +218,11 @@ impl GuidedPlanner {
         config: RankedConfig,
         left: &mut usize,
     ) -> Result<(Path, Guidance), NoPath> {
-        if config.library
-            && let Some(plan) = self.look_up(problem)
+        let library = if config.library { self.library(problem) } else { None };
+        if let Some(number) = library
+            && let Some(planned) = self.look_up(number, problem, found.first().copied())
         {
-            let guidance = Guidance {
-                abstraction: found.first().copied(),
-                preparatory: Some(plan.preparatory),
-                route: Route::Library,
-            };
-            return Ok((plan.path, guidance));
+            return Ok(planned);
         }
         let mut goal = self.hars.goal_set(problem);
         for found in found.iter().take(config.abstractions) {
@@ -199,8 +241,12 @@ impl GuidedPlanner {
             preparatory: entry.filter(|e| e.preparatory).map(|e| e.pose),
             route,
         };
-        if let Some(leg) = self.hars.direct(problem, problem.start, &goal) {
-            return Ok((leg.path, guidance(goal.entries().get(leg.entry), Route::Direct)));
+        // Who looked plans up has tried the curve straight to the goal.
+        let untried = if library.is_some() { goal.only_preparatory() } else { Some(goal.clone()) };
+        if let Some(untried) = untried
+            && let Some(leg) = self.hars.direct(problem, problem.start, &untried)
+        {
+            return Ok((leg.path, guidance(untried.entries().get(leg.entry), Route::Direct)));
         }
         // One search: it begins at the goal and at every preparatory pose.
         let leg = self.hars.search(problem, problem.start, &goal, None, left)?;

@@ -68,8 +68,7 @@ pub(super) fn condense(kind: ParkingType, sources: &[Source]) -> Vec<Vec<Segment
                     continue;
                 };
                 let bound = cost + TOLERANCE;
-                let known =
-                    search.plan_again(&library, &mut verdicts, problem, &planner.cost, bound);
+                let known = search.plan(&library, &mut verdicts, problem, &planner.cost, bound);
                 if known.is_none() {
                     manoeuvres.push(scaled(&manoeuvre, 1.0 / source.unit));
                     library.add(manoeuvre, &planner.cost);
@@ -90,7 +89,7 @@ pub(super) fn condense(kind: ParkingType, sources: &[Source]) -> Vec<Vec<Segment
             for sample in samples {
                 problem.start = sample.start;
                 let any = f64::INFINITY;
-                let plan = search.plan_again(&library, &mut verdicts, problem, &planner.cost, any);
+                let plan = search.plan(&library, &mut verdicts, problem, &planner.cost, any);
                 if let Some(plan) = plan {
                     records[plan.manoeuvre].uses += 1;
                     search.tried().for_each(|i| records[i].tries += 1);
