@@ -7,6 +7,8 @@
 //! Everything is read off the obstacle edges in the spot frame. The region is connected
 //! and contains the parked car, so if no edge enters it, no obstacle's inside does.
 
+use std::ops::Range;
+
 use super::cell::{Cell, Grid};
 use super::{Obstacles, ParkingType};
 use crate::geometry::{Aabb, Vec2};
@@ -47,23 +49,88 @@ const MAX_SHIFT: f64 = 1.0;
 /// `obstacles` in the spot frame. Several cells are maximal when an obstacle can either
 /// shorten the lane or narrow it; none of those returned contains another.
 pub fn abstractions(obstacles: &Obstacles, kind: ParkingType, grid: &Grid) -> Vec<Abstraction> {
-    // What could enter a cell, or bounds the spot.
-    let floor = -grid.lane_boundary(kind);
-    let top = grid.lane_boundary(kind) + MAX_SHIFT + grid.lane_width.max;
-    let is_near = |&(a, b): &(Vec2, Vec2)| a.y.max(b.y) > floor && a.y.min(b.y) < top;
-    let edges: Vec<(Vec2, Vec2)> = obstacles.edges().filter(is_near).collect();
-    let mut found = Vec::new();
-    let low = bottom_shift(&edges, kind, grid);
-    for shift in [low, protrusion(obstacles, kind, grid).max(low)] {
-        if shift > MAX_SHIFT || (shift > 0.0 && !kind.is_bay()) {
-            continue;
-        }
-        found = at_shift(&edges, kind, grid, shift);
-        if !found.is_empty() {
-            break;
-        }
+    Surroundings::new(obstacles).abstractions(kind, grid)
+}
+
+/// Obstacles as bare edges, in one frame.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Surroundings {
+    /// Those of polygons first, then points as edges of length zero.
+    edges: Vec<(Vec2, Vec2)>,
+    polygons: Vec<Range<usize>>,
+}
+
+impl Surroundings {
+    fn new(obstacles: &Obstacles) -> Self {
+        let mut all = Self::default();
+        obstacles.polygons.iter().for_each(|p| all.add_polygon(p.edges()));
+        obstacles.points.iter().for_each(|&p| all.add_point(p));
+        all
     }
-    found
+
+    /// Adds the edges of a polygon. Points come after all polygons.
+    pub fn add_polygon(&mut self, edges: impl Iterator<Item = (Vec2, Vec2)>) {
+        let first = self.edges.len();
+        self.edges.extend(edges);
+        self.polygons.push(first..self.edges.len());
+    }
+
+    /// Adds a point.
+    pub fn add_point(&mut self, p: Vec2) {
+        self.edges.push((p, p));
+    }
+
+    /// The same obstacles with every point mapped by `f`.
+    pub fn map(&self, f: impl Fn(Vec2) -> Vec2) -> Self {
+        let edges = self.edges.iter().map(|&(a, b)| (f(a), f(b))).collect();
+        Self { edges, polygons: self.polygons.clone() }
+    }
+
+    /// [`abstractions`] among these obstacles.
+    pub fn abstractions(&self, kind: ParkingType, grid: &Grid) -> Vec<Abstraction> {
+        // What could enter a cell, or bounds the spot.
+        let floor = -grid.lane_boundary(kind);
+        let top = grid.lane_boundary(kind) + MAX_SHIFT + grid.lane_width.max;
+        let is_near = |(a, b): &(Vec2, Vec2)| a.y.max(b.y) > floor && a.y.min(b.y) < top;
+        let edges: Vec<_> = self.edges.iter().copied().filter(is_near).collect();
+        let mut found = Vec::new();
+        let low = bottom_shift(&edges, kind, grid);
+        for shift in [low, self.protrusion(kind, grid).max(low)] {
+            if shift > MAX_SHIFT || (shift > 0.0 && !kind.is_bay()) {
+                continue;
+            }
+            found = at_shift(&edges, kind, grid, shift);
+            if !found.is_empty() {
+                break;
+            }
+        }
+        found
+    }
+
+    /// How far polygons and points of the spot's own row stand out into the lane.
+    fn protrusion(&self, kind: ParkingType, grid: &Grid) -> f64 {
+        let boundary = grid.lane_boundary(kind);
+        let (x_min, x_max) = (-grid.back, grid.dead_end.max);
+        let mut top = boundary;
+        for polygon in &self.polygons {
+            let edges = &self.edges[polygon.clone()];
+            if edges.iter().all(|(a, _)| a.y >= boundary) {
+                continue;
+            }
+            for &(a, b) in edges {
+                if let Some((a, b)) = clip(a, b, 0, x_min, x_max) {
+                    top = top.max(a.y.max(b.y));
+                }
+            }
+        }
+        let points = self.polygons.last().map_or(0, |p| p.end);
+        for (p, _) in &self.edges[points..] {
+            if p.x > x_min && p.x < x_max && p.y < boundary + MAX_SHIFT {
+                top = top.max(p.y);
+            }
+        }
+        top - boundary
+    }
 }
 
 /// The maximal cells whose frame lies `shift` metres along +y.
@@ -154,29 +221,6 @@ fn bottom_shift(edges: &[(Vec2, Vec2)], kind: ParkingType, grid: &Grid) -> f64 {
         Some(a.y.max(b.y) - floor)
     });
     tops.fold(0.0, f64::max)
-}
-
-/// How far polygons and points of the spot's own row stand out into the lane.
-fn protrusion(obstacles: &Obstacles, kind: ParkingType, grid: &Grid) -> f64 {
-    let boundary = grid.lane_boundary(kind);
-    let (x_min, x_max) = (-grid.back, grid.dead_end.max);
-    let mut top = boundary;
-    for polygon in &obstacles.polygons {
-        if polygon.vertices().iter().all(|v| v.y >= boundary) {
-            continue;
-        }
-        for (a, b) in polygon.edges() {
-            if let Some((a, b)) = clip(a, b, 0, x_min, x_max) {
-                top = top.max(a.y.max(b.y));
-            }
-        }
-    }
-    for p in &obstacles.points {
-        if p.x > x_min && p.x < x_max && p.y < boundary + MAX_SHIFT {
-            top = top.max(p.y);
-        }
-    }
-    top - boundary
 }
 
 /// The part of `a`–`b` with `low ≤ coordinate ≤ high` on one axis (0 is x, 1 is y).

@@ -12,7 +12,7 @@
 //! where the smallest cell is free. A parking type given with the scene leaves only its two
 //! directions to choose from.
 
-use super::abstraction::{Abstraction, abstractions};
+use super::abstraction::{Abstraction, Surroundings, abstractions};
 use super::cell::Grid;
 use super::{Obstacles, ParkingType, Scene};
 use crate::geometry::{Aabb, Frame, Pose, Vec2, segment_in_box};
@@ -97,12 +97,14 @@ fn goal_frame(scene: &Scene) -> Frame {
 
 /// The likeliest spot: the car stands in its lane rather than elsewhere, and the lane is large.
 fn found(scene: &Scene, precision: Precision) -> Option<(Frame, ParkingType)> {
-    let near = around_goal(scene);
+    let near = around_goal(scene, precision);
+    let grid = Grid::default();
     let mut best: Option<((bool, f64), Frame, ParkingType)> = None;
     for kind in ParkingType::ALL {
         let usual = spot_frame(scene, kind);
         for frame in [usual, other_way(&usual, kind)] {
-            let Some(lane) = lane(&seen(&near, frame, Some(kind), precision)) else { continue };
+            let seen = near.map(|p| from_parked(p, kind, frame.mirrored));
+            let Some(lane) = seen.abstractions(kind, &grid).first().copied() else { continue };
             let merit = merit(&lane, frame.local_from_world(scene.start));
             if best.is_none_or(|(most, ..)| merit > most) {
                 best = Some((merit, frame, kind));
@@ -112,17 +114,41 @@ fn found(scene: &Scene, precision: Precision) -> Option<(Frame, ParkingType)> {
     best.map(|(_, frame, kind)| (frame, kind))
 }
 
-/// The scene without what is too far away to enter any cell of the grid, whichever way it lies.
-fn around_goal(scene: &Scene) -> Scene {
+/// What is near enough to enter any cell of the grid, whichever way it lies, seen from the centre
+/// of the parked body, +x along its heading.
+fn around_goal(scene: &Scene, precision: Precision) -> Surroundings {
     /// Metres from the parked centre: more than to the farthest corner of the largest cell.
     const REACH: f64 = 20.0;
-    let center = scene.vehicle.body_center(scene.goal).position();
-    let all = Aabb { min: center, max: center }.inflated(REACH);
+    let center = scene.vehicle.body_center(scene.goal);
+    let view = Frame { origin_in_world: center, mirrored: false }.view();
+    let reach = Aabb { min: center.position(), max: center.position() }.inflated(REACH);
     let point = |&[x, y]: &[f64; 2]| Vec2::new(x, y);
-    let mut near = scene.clone();
-    near.obstacles.retain(|o| Aabb::around(o.iter().map(point)).intersects(&all));
-    near.points.retain(|p| all.contains(point(p)));
+    let is_near = |points: &[[f64; 2]]| Aabb::around(points.iter().map(point)).intersects(&reach);
+    let seen = |p: &[f64; 2]| precision.point(view(point(p)));
+    let mut near = Surroundings::default();
+    for polygon in scene.obstacles.iter().filter(|o| is_near(o)) {
+        let next = polygon.iter().cycle().skip(1);
+        near.add_polygon(polygon.iter().zip(next).map(|(a, b)| (seen(a), seen(b))));
+    }
+    for p in scene.points.iter().filter(|p| reach.contains(point(p))) {
+        near.add_point(seen(p));
+    }
     near
+}
+
+/// A point given in the frame of [`around_goal`], seen from the spot frame of `kind` that is
+/// `mirrored` or not: quarter turns, which round nothing.
+fn from_parked(p: Vec2, kind: ParkingType, mirrored: bool) -> Vec2 {
+    let plain = match kind {
+        ParkingType::Parallel => p,
+        ParkingType::Forward => Vec2::new(p.y, -p.x),
+        ParkingType::Reverse => Vec2::new(-p.y, p.x),
+    };
+    match (mirrored, kind.is_bay()) {
+        (false, _) => plain,
+        (true, true) => Vec2::new(-plain.x, plain.y),
+        (true, false) => Vec2::new(plain.x, -plain.y),
+    }
 }
 
 fn seen(scene: &Scene, frame: Frame, kind: Option<ParkingType>, precision: Precision) -> SpotGuess {
@@ -245,6 +271,11 @@ mod tests {
                     let expected = v.rear_axle(Pose::new(0.0, 0.0, kind.goal_heading()));
                     assert!(seen.distance(expected) < 1e-9, "{kind} {seen:?}");
                     assert!(signed_angle(seen.heading, expected.heading).abs() < 1e-9);
+                    let center =
+                        Frame { origin_in_world: v.body_center(scene.goal), mirrored: false };
+                    let point = Vec2::new(2.0, 9.0);
+                    let turned = from_parked(center.view()(point), kind, g.frame.mirrored);
+                    assert!((turned - g.frame.view()(point)).norm() < 1e-9, "{kind} {turned:?}");
                     let from = g.frame.local_from_world(world.compose(start));
                     assert!(from.distance(Pose::new(-9.0, 5.0, 0.0)) < 1e-9, "{kind} {from:?}");
                 }
