@@ -19,7 +19,7 @@ const BUDGET: Budget = Budget { max_expansions: 200_000 };
 fn bench(c: &mut Criterion) {
     let (config, vehicle) = (GeneratorConfig::default(), Vehicle::default());
     for method in Method::ALL {
-        let models = Models::usual(&[method]).expect("the models of the repository load");
+        let models = Models::usual(&[method], None).expect("the models of the repository load");
         let Ok(mut planner) = method.build(&models, &MethodSettings::default()) else {
             continue;
         };

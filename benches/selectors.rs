@@ -15,9 +15,10 @@ use n3p::world::ParkingType;
 fn bench(c: &mut Criterion) {
     let problems: Vec<_> =
         ParkingType::ALL.iter().flat_map(|&kind| common::problems_of(kind, 20)).collect();
+    let vehicle = Vehicle::default();
     let selector = |method| {
-        let models = Models::usual(&[method]).expect("the models of the repository load");
-        models.selector(method, &Vehicle::default()).expect("models/ holds a model for the method")
+        let models = Models::usual(&[method], Some(&vehicle)).expect("the models of the repository load");
+        models.selector(method, &vehicle).expect("models/ holds a model for the method")
     };
     let (knn, mlp) = (selector(Method::KnnN3p), selector(Method::MlpN3p));
     let mut group = c.benchmark_group("selectors");
@@ -25,13 +26,14 @@ fn bench(c: &mut Criterion) {
         let features = common::features(&problems, selector.grid());
         let mut poses = Vec::new();
         for f in &features {
-            selector.select(f, k, &mut poses);
+            selector.select(f, &vehicle, k, &mut poses);
         }
         let mut next = features.iter().cycle();
         group.bench_function(name, |b| {
             b.iter(|| {
                 poses.clear();
-                selector.select(black_box(next.next().expect("endless")), k, &mut poses);
+                let features = black_box(next.next().expect("endless"));
+                selector.select(features, &vehicle, k, &mut poses);
                 poses.len()
             });
         });

@@ -23,7 +23,7 @@ fn main() -> anyhow::Result<()> {
         args.get(3).map_or(Ok(ParkingType::ALL.to_vec()), |s| s.parse().map(|k| vec![k]))?;
     let levels = args.get(4).map_or(Ok(Level::ALL.to_vec()), |s| s.parse().map(|l| vec![l]))?;
 
-    let models = Models::usual(&[method])?;
+    let models = Models::usual(&[method], None)?;
     let mut planner = method.build(&models, &MethodSettings::default())?;
     for &kind in &kinds {
         for &level in &levels {

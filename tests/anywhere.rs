@@ -114,7 +114,7 @@ fn real_lots_are_planned_the_same_anywhere() {
         eprintln!("no real scenes here: skipped");
         return;
     };
-    let models = Models::usual(&[Method::N3p]).unwrap();
+    let models = Models::usual(&[Method::N3p], None).unwrap();
     let scenes: Vec<Scene> = [folder, &folder.with_file_name("dlp")]
         .iter()
         .flat_map(|f| Scene::read_dir(f).unwrap().into_iter().take(15))

@@ -3,11 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use n3p::curves::Segment;
-use n3p::dataset::{Metadata, Sample, Status};
+use n3p::dataset::{Dataset, Metadata, Sample, Status};
 use n3p::geometry::{Pose, signed_angle};
 use n3p::planners::HybridAStarConfig;
 use n3p::rng::{Stream, rng};
 use n3p::selectors::artefact::{Fault, Model, find_model};
+use n3p::selectors::fleet::FleetSelector;
 use n3p::selectors::knn::KnnSelector;
 use n3p::selectors::knn_file;
 use n3p::selectors::mlp::MlpSelector;
@@ -151,7 +152,7 @@ fn a_stored_start_returns_its_own_pose() {
     let knn = knn_of(&all, &[KIND], dir.path());
     for s in all.iter().filter(|s| s.status == Status::Solved) {
         let mut out = Vec::new();
-        knn.select(&Features::new(s.start, s.cell), 1, &mut out);
+        knn.select(&Features::new(s.start, s.cell), &Vehicle::default(), 1, &mut out);
         assert_eq!(out.len(), 1);
         let pose = out[0];
         assert!(pose.distance(s.rs_start) < 2e-6, "{pose:?} {:?}", s.rs_start);
@@ -181,7 +182,12 @@ fn an_empty_cell_falls_back_to_the_nearest_smaller_one() {
     }
     let knn = knn_of(&samples(KIND, &[index(1, 1, 1)], 3, 1), &[KIND], dir.path());
     let mut out = Vec::new();
-    knn.select(&features(Pose::new(0.0, 3.0, 0.0), index(1, 1, 0)), 3, &mut out);
+    knn.select(
+        &features(Pose::new(0.0, 3.0, 0.0), index(1, 1, 0)),
+        &Vehicle::default(),
+        3,
+        &mut out,
+    );
     assert!(out.is_empty(), "a larger cell must not answer");
 }
 
@@ -192,8 +198,8 @@ fn several_poses_differ_and_keep_their_order() {
     let query = features(Pose::new(1.0, 3.0, 0.1), 4);
     let before = Pose::default();
     let (mut one, mut many) = (Vec::new(), vec![before]);
-    knn.select(&query, 1, &mut one);
-    knn.select(&query, 5, &mut many);
+    knn.select(&query, &Vehicle::default(), 1, &mut one);
+    knn.select(&query, &Vehicle::default(), 5, &mut many);
     assert_eq!(many[0], before, "poses are appended");
     assert_eq!(one[0], many[1]);
     assert!(many.len() > 2 && many.len() <= 6, "{many:?}");
@@ -369,7 +375,7 @@ fn mlp_inference_equals_candle() {
     }
     let elsewhere = metadata().grid.cell(ParkingType::Reverse, 0);
     let mut out = Vec::new();
-    mlp.select(&Features::new(Pose::default(), elsewhere), 3, &mut out);
+    mlp.select(&Features::new(Pose::default(), elsewhere), &Vehicle::default(), 3, &mut out);
     assert!(out.is_empty(), "a type without a network has no answer");
 }
 
@@ -516,4 +522,58 @@ fn the_command_refuses_bad_input_before_training() {
     refused(&["knn", "--out", "file/knn.bin"], "file/knn.bin: cannot be written");
     refused(&["knn", "--data", "nowhere"], "nowhere");
     refused(&["mlp", "--out", "m.safetensors"], "--type");
+}
+
+#[test]
+fn one_network_learns_from_several_vehicles_reproducibly() {
+    let dir = tempfile::tempdir().unwrap();
+    let small = Dataset::read("datasets/small".as_ref(), None).unwrap();
+    let part = |width: f64| {
+        let mut set = Dataset { metadata: small.metadata.clone(), samples: vec![] };
+        set.metadata.vehicle.width = width;
+        // What the wider car drove, the narrower one can drive as well.
+        set.samples.extend(small.samples.iter().filter(|s| s.cell_index % 40 == 7).cloned());
+        set
+    };
+    let sets = [part(1.86), part(1.70)];
+    let train = |name: &str| {
+        let path = dir.path().join(name);
+        let log = training::fleet::train(&sets, &quick(3), &path).unwrap();
+        (log, std::fs::read(&path).unwrap())
+    };
+    let (log, bytes) = train("a.safetensors");
+    assert!(train("b.safetensors").1 == bytes, "not the same bytes again");
+    assert!(dir.path().join("a.card.md").exists() && dir.path().join("a.training.json").exists());
+    let path = dir.path().join("a.safetensors");
+    let fleet = FleetSelector::from_bytes(&path, &bytes).unwrap();
+    for of_kind in &log.kinds {
+        let kind = of_kind.kind;
+        assert!(dir.path().join(format!("a.{kind}.training.svg")).exists());
+        let solved = || sets.iter().flat_map(|s| s.solved()).filter(|s| s.cell.kind == kind);
+        assert_eq!(of_kind.samples, solved().count());
+        assert_eq!(of_kind.train_rows + of_kind.validation_rows, of_kind.samples);
+        assert!(of_kind.losses[of_kind.best_epoch - 1].train < of_kind.losses[0].train);
+        // What the log says of errors is what the file answers.
+        let mut errors = Vec::new();
+        for set in &sets {
+            let vehicle = &set.metadata.vehicle;
+            assert!(!fleet.manoeuvres(kind, vehicle).is_empty());
+            for s in set.solved().filter(|s| s.cell.kind == kind) {
+                let mut poses = Vec::new();
+                fleet.select(&Features::new(s.start, s.cell), vehicle, 2, &mut poses);
+                assert_eq!(poses.len(), 1);
+                errors.push(poses[0].distance(s.rs_start));
+            }
+        }
+        errors.sort_by(f64::total_cmp);
+        let (median, told) = (errors[errors.len() / 2], of_kind.validation.position_median_m);
+        assert!((0.4..2.5).contains(&(median / told)), "{kind}: {median} m, told {told} m");
+    }
+    for cut in [9, 500, bytes.len() / 2, bytes.len() - 1] {
+        assert!(FleetSelector::from_bytes(&path, &bytes[..cut]).is_err());
+    }
+    let mut flipped = bytes.clone();
+    flipped[bytes.len() - 100] ^= 1;
+    let error = FleetSelector::from_bytes(&path, &flipped).unwrap_err().to_string();
+    assert!(error.contains("checksum"), "{error}");
 }

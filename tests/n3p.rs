@@ -58,7 +58,7 @@ fn every_pose_the_knn_selects_has_a_free_curve_in_the_scenes_own_cell() {
                     asked += 1;
                     let start = Pose { y: problem.start.y - found.shift, ..problem.start };
                     poses.clear();
-                    selector.select(&Features::new(start, found.cell), 1, &mut poses);
+                    selector.select(&Features::new(start, found.cell), &vehicle, 1, &mut poses);
                     for &pose in &poses {
                         answered += 1;
                         assert!(

@@ -83,7 +83,7 @@ fn main() -> ExitCode {
 fn evaluate(args: &Args) -> Result<ExitCode> {
     let policy = args.policy.as_deref().map(|p| PolicySource::new(p, args.policy_limit));
     let models = match &args.models[..] {
-        [] => Models::usual(&args.methods),
+        [] => Models::usual(&args.methods, None),
         given => Models::load(given),
     };
     let models = models.or_bad_input()?.with_policy(policy.transpose().or_bad_input()?);

@@ -200,7 +200,7 @@ fn choose(args: &Args, scene: &Scene, problem: &Problem) -> Result<(Method, Mode
         return Err(BadInput(text).into());
     }
     let models = match &args.models[..] {
-        [] => Models::usual(&[method]),
+        [] => Models::usual(&[method], Some(&scene.vehicle)),
         given => Models::load(given),
     };
     let models = models.or_bad_input()?.with_policy(policy);

@@ -33,9 +33,10 @@ enum Command {
     ///
     /// A model card and a training log are written beside the model.
     Knn(KnnArgs),
-    /// Condenses data sets of several vehicles into manoeuvres for any vehicle
+    /// Condenses data sets of several vehicles into manoeuvres for any vehicle, and trains networks
+    /// that see the vehicle's shape
     ///
-    /// A model card and a training log are written beside the model.
+    /// A model card, a training log and the loss curves are written beside the model.
     Fleet(FleetArgs),
     /// Trains a driving policy by soft actor-critic
     ///
@@ -87,6 +88,12 @@ struct FleetArgs {
     /// Model file
     #[arg(long, value_name = "FILE", default_value = "models/fleet.safetensors")]
     out: PathBuf,
+    /// Settings of the networks' training, a TOML file; the defaults when omitted
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Seed of weights, shuffling and validation rows; overrides the settings
+    #[arg(long, value_name = "S")]
+    seed: Option<u64>,
 }
 
 #[derive(Args)]
@@ -132,12 +139,7 @@ fn main() -> ExitCode {
 }
 
 fn mlp(args: &MlpArgs) -> anyhow::Result<ExitCode> {
-    let mut config = match &args.config {
-        Some(path) => MlpConfig::read(path).or_bad_input()?,
-        None => MlpConfig::default(),
-    };
-    config.seed = args.seed.unwrap_or(config.seed);
-    config.validate().or_bad_input()?;
+    let config = mlp_config(args.config.as_deref(), args.seed)?;
     if args.out.is_some() && args.common.kind.is_none() {
         let text = "--out names one file, but every type gets its own: give --type, too";
         return Err(BadInput(text.to_owned()).into());
@@ -173,6 +175,17 @@ fn mlp(args: &MlpArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// The settings of a file, or the usual ones, with another seed if asked for.
+fn mlp_config(file: Option<&Path>, seed: Option<u64>) -> anyhow::Result<MlpConfig> {
+    let mut config = match file {
+        Some(path) => MlpConfig::read(path).or_bad_input()?,
+        None => MlpConfig::default(),
+    };
+    config.seed = seed.unwrap_or(config.seed);
+    config.validate().or_bad_input()?;
+    Ok(config)
+}
+
 fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
     artefact::check_writable(&args.out).or_bad_input()?;
     let (data, kinds) = read(&args.common)?;
@@ -190,6 +203,7 @@ fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn fleet(args: &FleetArgs) -> anyhow::Result<ExitCode> {
+    let config = mlp_config(args.config.as_deref(), args.seed)?;
     artefact::check_writable(&args.out).or_bad_input()?;
     let sets = args.data.iter().map(|folder| Dataset::read(folder, None).or_bad_input());
     let sets = sets.collect::<anyhow::Result<Vec<_>>>()?;
@@ -205,11 +219,22 @@ fn fleet(args: &FleetArgs) -> anyhow::Result<ExitCode> {
             return Err(bad(format!("its vehicle is that of {other}; give one set each")).into());
         }
     }
-    let log = training::fleet::train(&sets, &args.out).map_err(|e| {
+    let log = training::fleet::train(&sets, &config, &args.out).map_err(|e| {
         if e.is_bad_input() { BadInput(e.to_string()).into() } else { anyhow::Error::from(e) }
     })?;
-    for (kind, samples, manoeuvres) in &log.kinds {
-        cli::print(format!("{kind}: {manoeuvres} manoeuvres from {samples} samples"))?;
+    for k in &log.kinds {
+        cli::print(format!(
+            "{}: {} manoeuvres from {} samples; on {} unseen rows the network's median error is \
+             {:.2} m, {:.1}°; {:.0} % have a free curve to the goal, {:.0} % one from the start, too",
+            k.kind,
+            k.manoeuvres,
+            k.samples,
+            k.validation_rows,
+            k.validation.position_median_m,
+            k.validation.heading_median_rad.to_degrees(),
+            100.0 * k.reach.to_goal,
+            100.0 * k.reach.direct,
+        ))?;
     }
     cli::print(format!(
         "{}: {} vehicles, {} bytes",

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
@@ -14,6 +15,7 @@ use crate::planners::{
 use crate::rl::actor::ActorPolicy;
 use crate::rl::courses::Course;
 use crate::rl::rollout::{PolicyPlanner, RolloutConfig};
+use crate::selectors::PoseSelector;
 use crate::selectors::guided::{GuidedPlanner, RankedConfig};
 use crate::world::UnknownName;
 
@@ -176,16 +178,22 @@ impl Method {
 
     /// The planner of a learnt method with the models of one vehicle, which hold what it needs.
     fn learnt(self, models: &VehicleModels, settings: &MethodSettings) -> Box<dyn Planner + Send> {
-        let MethodSettings { planner: config, n3p, rl } = settings;
+        let MethodSettings { planner: config, rl, .. } = settings;
         if let Some(actor) = self.course().and_then(|course| models.actor(course)) {
             let policy = ActorPolicy::new(actor.clone(), rl.choice);
             return Box::new(PolicyPlanner::new(self.name(), policy, *rl, *config));
         }
         let selector = models.selector(self).expect("models that serve the method");
-        Box::new(match self {
-            Self::N3p => GuidedPlanner::ranked(self.name(), selector, *config, *n3p),
-            _ => GuidedPlanner::paper(self.name(), selector, *config),
-        })
+        Box::new(self.guided(selector, settings))
+    }
+
+    /// The planner of this method with a selector.
+    fn guided(self, selector: Arc<dyn PoseSelector>, settings: &MethodSettings) -> GuidedPlanner {
+        let MethodSettings { planner: config, n3p, .. } = *settings;
+        match self {
+            Self::N3p => GuidedPlanner::ranked(self.name(), selector, config, n3p),
+            _ => GuidedPlanner::paper(self.name(), selector, config),
+        }
     }
 
     /// That there is no model, and how to get one.
@@ -219,9 +227,7 @@ impl Method {
                     (*of_vehicle.vehicle(), planner)
                 });
                 let any = models.fleet(self).map(|selector| {
-                    let n3p = settings.n3p;
-                    let planner = GuidedPlanner::ranked(self.name(), selector, *config, n3p);
-                    Box::new(planner) as Box<dyn Planner + Send>
+                    Box::new(self.guided(selector, settings)) as Box<dyn Planner + Send>
                 });
                 ByVehicle::new(planners.collect(), any).ok_or_else(|| self.no_model())
             }

@@ -20,7 +20,7 @@ use crate::world::ParkingType;
 pub struct Models {
     /// In the order of their first files.
     vehicles: Vec<VehicleModels>,
-    /// Manoeuvres for vehicles that none of them serves.
+    /// For vehicles that none of them serves.
     fleet: Option<Arc<dyn PoseSelector>>,
     outside: Option<PolicySource>,
 }
@@ -159,15 +159,13 @@ impl Models {
     }
 
     /// Loads what `methods` need from the usual files, as far as they exist: `knn.bin` and
-    /// `knn-….bin`, `mlp-TYPE.safetensors`, `rl-COURSE.safetensors`.
-    pub fn usual(methods: &[Method]) -> Result<Self, ModelsError> {
+    /// `knn-….bin`, `mlp-TYPE.safetensors`, `rl-COURSE.safetensors`, `fleet.safetensors`. The last,
+    /// which is for any vehicle, is left out where others serve the `vehicle` that is asked for.
+    pub fn usual(methods: &[Method], vehicle: Option<&Vehicle>) -> Result<Self, ModelsError> {
         let needs = |method: Method| methods.contains(&method);
         let mut found = Vec::new();
         if needs(Method::KnnN3p) || needs(Method::N3p) {
             found.push(find_model("knn.bin"));
-        }
-        if needs(Method::N3p) {
-            found.push(find_model("fleet.safetensors"));
         }
         if needs(Method::MlpN3p) {
             let network = |kind| find_model(format!("mlp-{kind}.safetensors"));
@@ -190,6 +188,12 @@ impl Models {
                 }
             }
         }
+        let serves = |&&m: &&Method| vehicle.is_some_and(|v| models.serving(m, v).is_some());
+        let any = find_model("fleet.safetensors");
+        let mut use_it = methods.iter().filter(|m| matches!(m, Method::N3p | Method::MlpN3p));
+        if any.exists() && !use_it.all(|m| serves(&m)) {
+            models.add_selector(Model::load(&any)?)?;
+        }
         Ok(models)
     }
 
@@ -209,9 +213,9 @@ impl Models {
         own.or_else(|| self.for_method(method).find(|m| m.vehicle().covers(vehicle)))
     }
 
-    /// The manoeuvres that `method` plans with for vehicles that no other model serves.
+    /// The model that `method` plans with for vehicles that no other model serves.
     pub fn fleet(&self, method: Method) -> Option<Arc<dyn PoseSelector>> {
-        self.fleet.clone().filter(|_| method == Method::N3p)
+        self.fleet.clone().filter(|_| matches!(method, Method::N3p | Method::MlpN3p))
     }
 
     /// The selector that `method` plans with for `vehicle`; `None` where it needs none or has

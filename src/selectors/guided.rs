@@ -124,7 +124,8 @@ impl GuidedPlanner {
         // The cell's frame lies `shift` further out than the problem's.
         let start = Pose { y: problem.start.y - found.shift, ..problem.start };
         self.poses.clear();
-        self.selector.select(&Features::new(start, found.cell), k, &mut self.poses);
+        let features = Features::new(start, found.cell);
+        self.selector.select(&features, &problem.vehicle, k, &mut self.poses);
         for pose in &mut self.poses {
             pose.y += found.shift;
         }

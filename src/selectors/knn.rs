@@ -201,7 +201,7 @@ impl CellPoints {
 }
 
 impl PoseSelector for KnnSelector {
-    fn select(&self, features: &Features, k: usize, out: &mut Vec<Pose>) {
+    fn select(&self, features: &Features, _vehicle: &Vehicle, k: usize, out: &mut Vec<Pose>) {
         let header = self.file.header();
         let Some(kind) = header.kinds.iter().position(|h| h.kind == features.cell.kind) else {
             return;

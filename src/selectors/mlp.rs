@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::artefact::{self, ArtefactError, Fault};
 use super::network::{self, LAYERS, LayerWeights, Network, OUTPUTS};
-use super::tensor_file::{self, Content, NamedTensor};
+use super::tensor_file::{self, Content};
 use super::{Features, Normaliser, PoseSelector};
 use crate::geometry::Pose;
 use crate::vehicle::Vehicle;
@@ -57,17 +57,9 @@ pub struct MlpHeader {
 ///
 /// Panics when `weights` are not those of [`LAYERS`].
 pub fn encode(header: &MlpHeader, weights: &[LayerWeights]) -> Vec<u8> {
-    let mut tensors = Vec::new();
-    for (n, (layer, size)) in weights.iter().zip(LAYERS.windows(2)).enumerate() {
-        tensors.push(NamedTensor::f32(name(n, "bias"), vec![size[1]], &layer.bias));
-        tensors.push(NamedTensor::f32(name(n, "weight"), vec![size[1], size[0]], &layer.weight));
-    }
+    let tensors = tensor_file::layer_tensors("", &LAYERS, weights);
     let header = serde_json::to_string(header).expect("a header is plain data");
     tensor_file::encode(&header, tensors)
-}
-
-fn name(layer: usize, part: &str) -> String {
-    format!("layers.{layer}.{part}")
 }
 
 /// A network with its scaling and provenance.
@@ -91,7 +83,7 @@ impl MlpSelector {
         let mut bytes = Vec::new();
         artefact::open(path)?.read_to_end(&mut bytes).map_err(|e| Fault::Unreadable(e).of(path))?;
         let (header, weights) = decode(&bytes).map_err(|fault| fault.of(path))?;
-        let network = Network::new(&weights);
+        let network = Network::new(Features::COUNT, &weights);
         Ok(Self { networks: vec![Trained { path: path.to_owned(), header, network }] })
     }
 
@@ -148,13 +140,13 @@ impl MlpSelector {
     pub fn predict(&self, features: &Features) -> Option<Pose> {
         let trained = self.networks.iter().find(|n| n.header.kind == features.cell.kind)?;
         let input = trained.header.input.normalise(features.values());
-        let output = trained.network.forward(input);
+        let output = trained.network.forward(&input);
         Some(network::pose_from_outputs(trained.header.output.restore(output)))
     }
 }
 
 impl PoseSelector for MlpSelector {
-    fn select(&self, features: &Features, k: usize, out: &mut Vec<Pose>) {
+    fn select(&self, features: &Features, _vehicle: &Vehicle, k: usize, out: &mut Vec<Pose>) {
         if k > 0 {
             let pose = self.predict(features).filter(|pose| pose.is_finite());
             out.extend(pose);
@@ -178,13 +170,7 @@ fn decode(bytes: &[u8]) -> Result<(MlpHeader, Vec<LayerWeights>), Fault> {
     let header: MlpHeader =
         serde_json::from_str(&json).map_err(|e| Fault::Header(e.to_string()))?;
     check_header(&header).map_err(Fault::Header)?;
-    let layers = LAYERS.windows(2).enumerate().map(|(n, size)| {
-        Ok(LayerWeights {
-            weight: tensor_file::f32s(&tensors, &name(n, "weight"), &[size[1], size[0]])?,
-            bias: tensor_file::f32s(&tensors, &name(n, "bias"), &[size[1]])?,
-        })
-    });
-    let layers = layers.collect::<Result<Vec<_>, Fault>>()?;
+    let layers = tensor_file::layers(&tensors, "", &LAYERS)?;
     Ok((header, layers))
 }
 

@@ -16,7 +16,7 @@ pub mod network;
 mod normaliser;
 pub mod tensor_file;
 
-pub use features::Features;
+pub use features::{Features, UNIT_COUNT, UNIT_NAMES};
 pub use normaliser::Normaliser;
 
 use crate::curves::Segment;
@@ -27,9 +27,9 @@ use crate::world::cell::Grid;
 
 /// Ranks preparatory poses. Implementations are immutable and shared between threads.
 pub trait PoseSelector: Send + Sync {
-    /// Appends up to `k` preparatory poses (rear axle, spot frame) for `features`, best first.
-    /// Appends none where the model knows nothing, such as an infeasible cell.
-    fn select(&self, features: &Features, k: usize, out: &mut Vec<Pose>);
+    /// Appends up to `k` preparatory poses of `vehicle` (rear axle, spot frame) for `features`,
+    /// best first. Appends none where the model knows nothing, such as an infeasible cell.
+    fn select(&self, features: &Features, vehicle: &Vehicle, k: usize, out: &mut Vec<Pose>);
 
     /// The manoeuvres it knows for spots of a type: motions in driving order that end at the
     /// parked pose, drivable by `vehicle`. None by default.

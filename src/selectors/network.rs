@@ -1,5 +1,5 @@
 //! The paper's network, 6 → 256 → 256 → 256 → 128 → 4 with ReLU, evaluated without a
-//! framework.
+//! framework; the network for any vehicle has more inputs.
 //!
 //! One sample at a time, plain loops over single precision. A layer's outputs are
 //! computed in blocks whose sums stay in registers while the block's weights are read once,
@@ -11,9 +11,14 @@ use super::Features;
 use crate::geometry::Pose;
 
 /// Widths of the layers, input and output included (paper, section IV).
-pub const LAYERS: [usize; 6] = [Features::COUNT, 256, 256, 256, 128, OUTPUTS];
+pub const LAYERS: [usize; 6] = layers(Features::COUNT);
 /// Number of outputs: `(x, y, cos θ, sin θ)` of the preparatory pose.
 pub const OUTPUTS: usize = 4;
+
+/// [`LAYERS`] with another number of inputs.
+pub const fn layers(inputs: usize) -> [usize; 6] {
+    [inputs, 256, 256, 256, 128, OUTPUTS]
+}
 
 /// Outputs per block: eight registers of four numbers on the plainest x86-64.
 const BLOCK: usize = 32;
@@ -87,12 +92,13 @@ impl Dense {
 }
 
 impl Network {
-    /// Lays out the weights of [`LAYERS`].
+    /// Lays out the weights of a network with so many inputs.
     ///
-    /// Panics when their sizes are not those of [`LAYERS`].
-    pub fn new(weights: &[LayerWeights]) -> Self {
-        assert_eq!(weights.len(), LAYERS.len() - 1, "one set of weights per layer");
-        let layers = weights.iter().zip(LAYERS.windows(2)).map(|(weights, size)| {
+    /// Panics when their sizes are not those of its [`layers`].
+    pub fn new(inputs: usize, weights: &[LayerWeights]) -> Self {
+        let sizes = layers(inputs);
+        assert_eq!(weights.len(), sizes.len() - 1, "one set of weights per layer");
+        let layers = weights.iter().zip(sizes.windows(2)).map(|(weights, size)| {
             assert_eq!(weights.weight.len(), size[0] * size[1], "weights of {size:?}");
             assert_eq!(weights.bias.len(), size[1], "biases of {size:?}");
             Dense::new(size[0], size[1], weights)
@@ -100,8 +106,9 @@ impl Network {
         Self { layers: layers.collect() }
     }
 
-    /// Normalised features → normalised outputs.
-    pub fn forward(&self, input: [f32; Features::COUNT]) -> [f32; OUTPUTS] {
+    /// Normalised features, as many as there are inputs, → normalised outputs.
+    pub fn forward(&self, input: &[f32]) -> [f32; OUTPUTS] {
+        assert_eq!(input.len(), self.layers[0].inputs, "one value for each input");
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
             // SAFETY: the processor has AVX2.
@@ -114,16 +121,16 @@ impl Network {
     /// rounding would differ.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn forward_avx2(&self, input: [f32; Features::COUNT]) -> [f32; OUTPUTS] {
+    fn forward_avx2(&self, input: &[f32]) -> [f32; OUTPUTS] {
         self.forward_plain(input)
     }
 
     #[inline(always)]
-    fn forward_plain(&self, input: [f32; Features::COUNT]) -> [f32; OUTPUTS] {
+    fn forward_plain(&self, input: &[f32]) -> [f32; OUTPUTS] {
         let mut values = [[0.0_f32; BLOCK]; WIDEST / BLOCK];
         let mut active = [(0_usize, 0.0_f32); WIDEST];
         let mut count = input.len();
-        for (i, v) in input.into_iter().enumerate() {
+        for (i, &v) in input.iter().enumerate() {
             active[i] = (i, v);
         }
         let last = self.layers.len() - 1;
@@ -175,11 +182,12 @@ mod tests {
     #[test]
     fn equals_the_textbook_sum_and_itself_without_avx2() {
         let weights = random_weights(5);
-        let network = Network::new(&weights);
+        let network = Network::new(Features::COUNT, &weights);
         for i in 0..20 {
-            let input = std::array::from_fn(|j| ((i * 7 + j * 3) % 11) as f32 / 5.0 - 1.0);
-            let got = network.forward(input);
-            assert_eq!(got, network.forward_plain(input));
+            let input: [f32; 6] =
+                std::array::from_fn(|j| ((i * 7 + j * 3) % 11) as f32 / 5.0 - 1.0);
+            let got = network.forward(&input);
+            assert_eq!(got, network.forward_plain(&input));
             for (g, e) in got.iter().zip(reference(&weights, input)) {
                 assert!((g - e).abs() < 1e-4, "input {i}: {g} against {e}");
             }

@@ -10,6 +10,7 @@ use safetensors::{Dtype, SafeTensorError, SafeTensors};
 use serde::Deserialize;
 
 use super::artefact::Fault;
+use super::network::LayerWeights;
 use crate::files::sha256_hex;
 
 const METADATA_KEY: &str = "n3p";
@@ -51,6 +52,38 @@ pub fn encode(header: &str, mut tensors: Vec<NamedTensor>) -> Vec<u8> {
         (&t.name, view.expect("as many bytes as the shape says"))
     });
     safetensors::serialize(views, Some(metadata)).expect("tensors are within the format")
+}
+
+/// The layers of a network of these widths as tensors `PREFIXlayers.N.weight` (`[outputs, inputs]`)
+/// and `PREFIXlayers.N.bias` (`[outputs]`). Panics where the weights are not of these widths.
+pub fn layer_tensors(prefix: &str, widths: &[usize], weights: &[LayerWeights]) -> Vec<NamedTensor> {
+    let mut tensors = Vec::new();
+    for (n, (layer, size)) in weights.iter().zip(widths.windows(2)).enumerate() {
+        let name = |part| layer_name(prefix, n, part);
+        tensors.push(NamedTensor::f32(name("bias"), vec![size[1]], &layer.bias));
+        tensors.push(NamedTensor::f32(name("weight"), vec![size[1], size[0]], &layer.weight));
+    }
+    tensors
+}
+
+/// What [`layer_tensors`] made tensors of.
+pub fn layers(
+    tensors: &SafeTensors,
+    prefix: &str,
+    widths: &[usize],
+) -> Result<Vec<LayerWeights>, Fault> {
+    let layers = widths.windows(2).enumerate().map(|(n, size)| {
+        let name = |part| layer_name(prefix, n, part);
+        Ok(LayerWeights {
+            weight: f32s(tensors, &name("weight"), &[size[1], size[0]])?,
+            bias: f32s(tensors, &name("bias"), &[size[1]])?,
+        })
+    });
+    layers.collect()
+}
+
+fn layer_name(prefix: &str, layer: usize, part: &str) -> String {
+    format!("{prefix}layers.{layer}.{part}")
 }
 
 /// Only the version, so that a file of another version is called that and not damaged.

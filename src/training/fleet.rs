@@ -1,14 +1,26 @@
-//! Samples of many vehicles → one library of manoeuvres for any vehicle.
+//! Samples of many vehicles → one model for any: a library of manoeuvres, and networks that see
+//! the shape of the vehicle.
 
+use std::num::NonZero;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::curve::{self, EpochLoss};
 use super::library::{Source, condense};
-use super::{TrainingError, card, solved, write_beside};
+use super::mlp::{LEAST_SAMPLES, split};
+use super::quality::{Errors, Reach, errors, reach};
+use super::regression::{Rows, Trainable, fit, predictions};
+use super::targets::{self, Example};
+use super::{MlpConfig, TrainingError, card, solved, write_beside};
 use crate::dataset::{Dataset, Sample};
+use crate::geometry::Pose;
 use crate::selectors::artefact;
-use crate::selectors::fleet::{self, FleetHeader};
+use crate::selectors::fleet::{
+    self, FleetHeader, Scaling, UNIT_LAYERS, UnitManoeuvres, in_metres, in_radii,
+};
+use crate::selectors::network::{LayerWeights, OUTPUTS, outputs_from_pose};
+use crate::selectors::{Features, Normaliser, UNIT_COUNT, UNIT_NAMES};
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
 
@@ -19,60 +31,183 @@ pub struct FleetLog {
     pub fleet: Vec<Vehicle>,
     /// SHA-256 of their data sets.
     pub data_sha256: Vec<String>,
-    /// Parking types, and the solved samples of all vehicles and the manoeuvres of each.
-    pub kinds: Vec<(ParkingType, usize, usize)>,
+    /// Settings of the networks' training.
+    pub config: MlpConfig,
+    /// Parking type by parking type.
+    pub kinds: Vec<FleetKindLog>,
     /// Size of the model, bytes.
     pub bytes: usize,
 }
 
-/// Condenses the samples of `sets`, one of each vehicle, into the model `out`, with its log and its
-/// model card beside it.
-pub fn train(sets: &[Dataset], out: &Path) -> Result<FleetLog, TrainingError> {
+/// What was learnt of one parking type.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FleetKindLog {
+    /// The type.
+    pub kind: ParkingType,
+    /// Solved samples of all vehicles.
+    pub samples: usize,
+    /// Manoeuvres kept.
+    pub manoeuvres: usize,
+    /// Rows that the network learnt.
+    pub train_rows: usize,
+    /// Rows kept apart.
+    pub validation_rows: usize,
+    /// Losses epoch by epoch.
+    pub losses: Vec<EpochLoss>,
+    /// The epoch of the stored network, from 1.
+    pub best_epoch: usize,
+    /// Errors of the stored network on the rows kept apart.
+    pub validation: Errors,
+    /// What its predictions for these rows are worth to a planner.
+    pub reach: Reach,
+}
+
+/// Condenses the samples of `sets`, one of each vehicle, into the model `out`, and trains its
+/// networks; log, model card and loss curves are written beside it.
+pub fn train(sets: &[Dataset], config: &MlpConfig, out: &Path) -> Result<FleetLog, TrainingError> {
+    config.validate()?;
     let condensed: Vec<Result<_, TrainingError>> = std::thread::scope(|scope| {
-        let running = ParkingType::ALL.map(|kind| scope.spawn(move || learn(sets, kind)));
+        let condense = |kind| move || solved_of(sets, kind).map(|all| manoeuvres(sets, kind, &all));
+        let running = ParkingType::ALL.map(|kind| scope.spawn(condense(kind)));
         running.into_iter().map(|r| r.join().expect("learning does not panic")).collect()
     });
-    let (mut kinds, mut logs, mut manoeuvres) = (Vec::new(), Vec::new(), Vec::new());
-    for (kind, result) in ParkingType::ALL.into_iter().zip(condensed) {
-        let (samples, of_kind) = result?;
-        kinds.push((kind, of_kind.len(), of_kind.iter().map(Vec::len).sum()));
-        logs.push((kind, samples, of_kind.len()));
-        manoeuvres.push(of_kind);
+    let condensed: Vec<UnitManoeuvres> = condensed.into_iter().collect::<Result<_, _>>()?;
+    let (mut scaling, mut networks, mut logs) = (Vec::new(), Vec::new(), Vec::new());
+    for (kind, manoeuvres) in ParkingType::ALL.into_iter().zip(&condensed) {
+        let learnt = learn(sets, kind, config, manoeuvres.len())?;
+        let picture = curve::svg(&format!("fleet, {kind}: loss"), &learnt.log.losses)?;
+        let name = format!("{kind}.training.svg");
+        artefact::write(&out.with_extension(name), picture.as_bytes())?;
+        scaling.push(learnt.scaling);
+        networks.push(learnt.weights);
+        logs.push(learnt.log);
     }
-    let fleet: Vec<Vehicle> = sets.iter().map(|s| s.metadata.vehicle).collect();
-    let data_sha256: Vec<String> =
-        sets.iter().map(|s| s.content_sha256(&ParkingType::ALL)).collect();
+    let count = |m: &UnitManoeuvres| m.iter().map(Vec::len).sum();
+    let kinds = ParkingType::ALL.into_iter().zip(&condensed);
     let header = FleetHeader {
         format_version: fleet::VERSION,
-        fleet: fleet.clone(),
-        data_sha256: data_sha256.clone(),
-        kinds,
+        fleet: sets.iter().map(|s| s.metadata.vehicle).collect(),
+        data_sha256: sets.iter().map(|s| s.content_sha256(&ParkingType::ALL)).collect(),
+        kinds: kinds.map(|(kind, m)| (kind, m.len(), count(m))).collect(),
+        features: UNIT_NAMES.map(str::to_owned).to_vec(),
+        scaling,
+        training: serde_json::to_value(config).expect("settings are plain data"),
         crate_version: env!("CARGO_PKG_VERSION").to_owned(),
     };
-    let bytes = fleet::encode(&header, &manoeuvres);
+    let bytes = fleet::encode(&header, &condensed, &networks);
     artefact::write(out, &bytes)?;
-    let log = FleetLog { fleet, data_sha256, kinds: logs, bytes: bytes.len() };
+    let FleetHeader { fleet, data_sha256, .. } = header;
+    let (config, bytes) = (config.clone(), bytes.len());
+    let log = FleetLog { fleet, data_sha256, config, kinds: logs, bytes };
     write_beside(out, &log, card::fleet(out, &log))?;
     Ok(log)
 }
 
-/// The solved samples of a type, counted, and the manoeuvres that serve them.
-fn learn(
-    sets: &[Dataset],
-    kind: ParkingType,
-) -> Result<(usize, fleet::UnitManoeuvres), TrainingError> {
-    let mut samples: Vec<Vec<&Sample>> = Vec::new();
+/// The solved samples of a type, set by set; each has a few.
+fn solved_of(sets: &[Dataset], kind: ParkingType) -> Result<Vec<Vec<&Sample>>, TrainingError> {
+    let mut all = Vec::new();
     for set in sets {
         let of_set = solved(&set.samples, kind, set.metadata.grid.cell_count(kind))?;
-        if of_set.is_empty() {
-            return Err(TrainingError::NoSamples(kind));
+        if of_set.len() < LEAST_SAMPLES {
+            let (samples, needed) = (of_set.len(), LEAST_SAMPLES);
+            return Err(TrainingError::TooFew { kind, samples, needed });
         }
-        samples.push(of_set);
+        all.push(of_set);
     }
-    let sources = sets.iter().zip(&samples).map(|(set, solved)| {
+    Ok(all)
+}
+
+/// The manoeuvres that serve all samples.
+fn manoeuvres(sets: &[Dataset], kind: ParkingType, solved: &[Vec<&Sample>]) -> UnitManoeuvres {
+    let sources = sets.iter().zip(solved).map(|(set, solved)| {
         let unit = set.metadata.vehicle.turning_radius();
         Source { metadata: &set.metadata, solved, unit }
     });
-    let sources: Vec<Source> = sources.collect();
-    Ok((samples.iter().map(Vec::len).sum(), condense(kind, &sources)))
+    condense(kind, &sources.collect::<Vec<_>>())
+}
+
+/// A network and how it was learnt.
+struct Learnt {
+    scaling: Scaling,
+    weights: Vec<LayerWeights>,
+    log: FleetKindLog,
+}
+
+/// One network for the samples of all vehicles.
+fn learn(
+    sets: &[Dataset],
+    kind: ParkingType,
+    config: &MlpConfig,
+    manoeuvres: usize,
+) -> Result<Learnt, TrainingError> {
+    let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
+    let all = solved_of(sets, kind)?;
+    let parts = sets.iter().zip(&all).map(|(set, solved)| {
+        let (train, validation) =
+            split(targets::examples(&set.metadata, solved, config, threads), config);
+        Part { set, train, validation }
+    });
+    let parts: Vec<Part> = parts.collect();
+    let [train, validation] = [|p: &Part| p.raw(&p.train), |p: &Part| p.raw(&p.validation)]
+        .map(|rows| parts.iter().flat_map(rows).unzip::<_, _, Vec<_>, Vec<_>>());
+    let scaling = Scaling { input: Normaliser::fit(&train.0), output: Normaliser::fit(&train.1) };
+    let [train, validation] = [train, validation]
+        .map(|(inputs, outputs)| Rows::new(&inputs, &outputs, &scaling.input, &scaling.output));
+    let model = Trainable::new(&UNIT_LAYERS, config.seed)?;
+    let judged = || {
+        let predicted = predictions(&model, &validation, &scaling.output)?;
+        Ok::<_, TrainingError>(judge(&parts, &predicted))
+    };
+    let (mut weights, mut quality, mut best_epoch) = (model.weights()?, judged()?, 0);
+    let losses = fit(&model, &train, &validation, config, kind.name(), |losses| {
+        (weights, quality, best_epoch) = (model.weights()?, judged()?, losses.len());
+        let (Errors { position_median_m: median, .. }, reach) = quality;
+        Ok(format!("median {median:.2} m, direct {:.0} %", 100.0 * reach.direct))
+    })?;
+    let log = FleetKindLog {
+        kind,
+        samples: all.iter().map(Vec::len).sum(),
+        manoeuvres,
+        train_rows: train.len(),
+        validation_rows: validation.len(),
+        losses,
+        best_epoch,
+        validation: quality.0,
+        reach: quality.1,
+    };
+    Ok(Learnt { scaling, weights, log })
+}
+
+/// Rows of one vehicle.
+struct Part<'a> {
+    set: &'a Dataset,
+    train: Vec<Example>,
+    validation: Vec<Example>,
+}
+
+impl Part<'_> {
+    /// Inputs and outputs of `examples`, lengths in turning radii.
+    fn raw(&self, examples: &[Example]) -> Vec<([f32; UNIT_COUNT], [f32; OUTPUTS])> {
+        let (grid, vehicle) = (&self.set.metadata.grid, &self.set.metadata.vehicle);
+        let row = |e: &Example| {
+            let input = Features::new(e.start, e.cell).unit_values(grid, vehicle);
+            (input, outputs_from_pose(in_radii(e.target, vehicle)))
+        };
+        examples.iter().map(row).collect()
+    }
+}
+
+/// How good `predicted`, the poses for the validation rows of all parts in turning radii, are.
+fn judge(parts: &[Part], predicted: &[Pose]) -> (Errors, Reach) {
+    let (mut poses, mut wanted, mut reaches) = (Vec::new(), Vec::new(), Vec::new());
+    let mut rest = predicted;
+    for Part { set, validation, .. } in parts {
+        let (own, others) = rest.split_at(validation.len());
+        rest = others;
+        let own: Vec<Pose> = own.iter().map(|&p| in_metres(p, &set.metadata.vehicle)).collect();
+        reaches.push(reach(&set.metadata, validation, &own));
+        poses.extend(own);
+        wanted.extend_from_slice(validation);
+    }
+    (errors(&poses, &wanted), Reach::mean(&reaches))
 }

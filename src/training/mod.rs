@@ -1,8 +1,9 @@
 //! Rows of a data set → model files.
 //!
-//! [`knn`] stores samples and a [`library`] of their manoeuvres; [`mlp`] trains a network, with
-//! [`curve`] as its helper. Both take samples and metadata of one data set
-//! and write an artefact that [`crate::selectors`] loads. Beside it they leave what programs
+//! [`knn`] stores samples and a [`library`] of their manoeuvres; [`mlp`] trains a network
+//! (`targets` says what it is to learn, `regression` fits it). Both take samples and metadata of
+//! one data set; [`fleet`] does both for the data sets of several vehicles. All write an artefact
+//! that [`crate::selectors`] loads. Beside it they leave what programs
 //! and people want to know of it: a log ([`log_path`]), with its [`quality`], and a model card
 //! ([`card_path`]).
 
@@ -15,6 +16,7 @@ pub mod library;
 pub mod mlp;
 mod mlp_config;
 pub mod quality;
+mod regression;
 pub mod rl;
 mod settings;
 mod targets;

@@ -63,6 +63,24 @@ pub struct Reach {
     pub wanted_direct: f64,
 }
 
+impl Reach {
+    /// Of all that the `parts` looked at.
+    pub(super) fn mean(parts: &[Self]) -> Self {
+        let rows = parts.iter().map(|p| p.rows).sum::<usize>();
+        let mean = |share: fn(&Self) -> f64| {
+            let found: f64 = parts.iter().map(|p| share(p) * p.rows as f64).sum();
+            found / rows.max(1) as f64
+        };
+        Self {
+            rows,
+            to_goal: mean(|p| p.to_goal),
+            direct: mean(|p| p.direct),
+            wanted_to_goal: mean(|p| p.wanted_to_goal),
+            wanted_direct: mean(|p| p.wanted_direct),
+        }
+    }
+}
+
 /// Judges `proposed`, the poses for `examples`; of many rows some, evenly spread.
 pub(super) fn reach(metadata: &Metadata, examples: &[Example], proposed: &[Pose]) -> Reach {
     const MOST: usize = 1000;
