@@ -13,10 +13,10 @@ use proptest::prelude::*;
 
 const BUDGET: Budget = Budget { max_expansions: 200_000 };
 
-/// Plans generated scenes for `vehicle`; every path must pass the independent check. Returns how many
+/// Plans generated scenes for `vehicle` with `method`; every path must pass the independent check. Returns how many
 /// plans needed a search.
-fn plan_all(models: &Models, vehicle: &Vehicle, count: u64) -> usize {
-    let mut planner = Method::N3p.build(models, &MethodSettings::default()).unwrap();
+fn plan_all(models: &Models, method: Method, vehicle: &Vehicle, count: u64) -> usize {
+    let mut planner = method.build(models, &MethodSettings::default()).unwrap();
     let mut searched = 0;
     for kind in ParkingType::ALL {
         for level in Level::ALL {
@@ -26,7 +26,7 @@ fn plan_all(models: &Models, vehicle: &Vehicle, count: u64) -> usize {
                 let result = planner.plan(&problem, BUDGET);
                 let path = result.outcome.unwrap_or_else(|e| panic!("{}: {e}", scene.name));
                 searched += usize::from(result.expansions > 0);
-                let file = PathFile::new(&scene, &problem.frame, &path, "n3p");
+                let file = PathFile::new(&scene, &problem.frame, &path, method.name());
                 oracle::check(&scene, &file).unwrap_or_else(|e| panic!("{}: {e}", scene.name));
             }
         }
@@ -63,7 +63,7 @@ proptest! {
         prop_assert!(vehicle.validate().is_ok() && Vehicle::default().covers(&vehicle));
         let models = Models::load(&["models/knn.bin"]).unwrap();
         prop_assert!(models.check_vehicle(Method::N3p, "a", &vehicle).is_ok());
-        plan_all(&models, &vehicle, 2);
+        plan_all(&models, Method::N3p, &vehicle, 2);
     }
 
     #[test]
@@ -103,8 +103,10 @@ fn one_model_plans_for_vehicles_it_never_saw() {
     for name in ["held-out-hatch", "held-out-estate", "held-out-suv"] {
         let file = format!("experiments/vehicles/{name}.toml");
         let vehicle = Vehicle::read(Path::new(&file)).unwrap();
-        let searched = plan_all(&models, &vehicle, 4);
-        assert!(searched <= 3, "{name}: {searched} of 36 searched");
+        for (method, most) in [(Method::N3p, 3), (Method::MlpN3p, 24)] {
+            let searched = plan_all(&models, method, &vehicle, 4);
+            assert!(searched <= most, "{name}, {method}: {searched} of 36 searched");
+        }
     }
 }
 
@@ -117,8 +119,8 @@ fn models_of_several_vehicles_go_together() {
     assert!(of(&tpcap).is_like(&tpcap));
     // The cases of Dragon Lake are 2 mm narrower.
     assert!(of(&Vehicle { width: 1.94, ..tpcap }).is_like(&tpcap));
-    plan_all(&models, &tpcap, 2);
-    plan_all(&models, &Vehicle::default(), 2);
+    plan_all(&models, Method::N3p, &tpcap, 2);
+    plan_all(&models, Method::N3p, &Vehicle::default(), 2);
 }
 
 fn run(program: &str, folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
