@@ -83,7 +83,8 @@ fn bench(c: &mut Criterion) {
     let rounds = (0..100).flat_map(|_| side.round(&mut rng));
     let transitions: Vec<Transition> = rounds.collect();
     let seen: Vec<Observation> = transitions.iter().map(|t| t.before).collect();
-    let models = Models::usual(&[Method::RlEval], None).expect("the policies of the repository load");
+    let models =
+        Models::usual(&[Method::RlEval], None).expect("the policies of the repository load");
     let of_vehicle = models.serving(Method::RlEval, &Vehicle::default());
     let actor = of_vehicle.and_then(|m| m.actor(Course::Eval)).expect("rl-eval is shipped");
     let mut policy = ActorPolicy::new(actor.clone(), Choice::Mean);

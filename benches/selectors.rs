@@ -17,7 +17,8 @@ fn bench(c: &mut Criterion) {
         ParkingType::ALL.iter().flat_map(|&kind| common::problems_of(kind, 20)).collect();
     let vehicle = Vehicle::default();
     let selector = |method| {
-        let models = Models::usual(&[method], Some(&vehicle)).expect("the models of the repository load");
+        let models =
+            Models::usual(&[method], Some(&vehicle)).expect("the models of the repository load");
         models.selector(method, &vehicle).expect("models/ holds a model for the method")
     };
     let (knn, mlp) = (selector(Method::KnnN3p), selector(Method::MlpN3p));

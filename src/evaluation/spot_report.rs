@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::episode::Episode;
 use super::models::Models;
-use super::trace::regions;
+use super::trace::{abstraction, regions};
 use crate::geometry::Pose;
 use crate::world::ParkingType;
 
@@ -42,7 +42,7 @@ impl SpotReport {
     pub fn new(episode: &Episode, models: &Models) -> Option<Self> {
         let guidance = episode.result.guidance.as_ref()?;
         let problem = &episode.problem;
-        let measured = guidance.abstraction.map(|a| a.measured);
+        let measured = abstraction(episode, models).map(|(a, _)| a.measured);
         let corners = regions(episode, models)
             .map(|both| both.map(|r| r.vertices().iter().map(|v| [v.x, v.y]).collect()));
         Some(Self {

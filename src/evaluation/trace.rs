@@ -15,6 +15,8 @@ use super::episode::Episode;
 use super::method::Method;
 use super::models::Models;
 use crate::geometry::{Aabb, Polygon, Pose, Vec2};
+use crate::world::abstraction::{Abstraction, abstractions};
+use crate::world::cell::Grid;
 
 /// A path as its motions, and what N3P made of the spot; all in the scene's own frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -64,16 +66,25 @@ impl Trace {
     }
 }
 
-/// The lane's and the spot's rectangle that a guided planner used, in the scene's frame.
-pub fn regions(episode: &Episode, models: &Models) -> Option<[Polygon; 2]> {
-    let found = episode.result.guidance.as_ref()?.abstraction?;
+/// The largest cell that a guided planner's model sees around the spot, and its grid; `None` for
+/// other planners, and where the scene has no such structure.
+pub fn abstraction(episode: &Episode, models: &Models) -> Option<(Abstraction, Grid)> {
+    let problem = &episode.problem;
+    episode.result.guidance.as_ref()?;
     let method: Method = episode.row.method.parse().ok()?;
-    let selector = models.selector(method, &episode.problem.vehicle)?;
+    let grid = *models.selector(method, &problem.vehicle)?.grid();
+    let found = abstractions(&problem.obstacles, problem.kind?, &grid);
+    Some((*found.first()?, grid))
+}
+
+/// Its lane's and its spot's rectangle, in the scene's frame.
+pub fn regions(episode: &Episode, models: &Models) -> Option<[Polygon; 2]> {
+    let (found, grid) = abstraction(episode, models)?;
     let frame = &episode.problem.frame;
     let to_world = |region: Aabb| {
         Polygon::rectangle(Pose::default(), region).map(|v: Vec2| frame.world_from_local_point(v))
     };
-    Some(found.regions(selector.grid()).map(to_world))
+    Some(found.regions(&grid).map(to_world))
 }
 
 /// Rounded to thousandths.

@@ -36,7 +36,6 @@ pub use scenario::ScenarioHybridAStar;
 
 use crate::curves::Path;
 use crate::geometry::{Pose, signed_angle};
-use crate::world::abstraction::Abstraction;
 
 /// Anything that plans a path. Implementations keep buffers between calls; results
 /// never depend on earlier calls.
@@ -146,9 +145,6 @@ pub enum NoPath {
 /// What guided planning did: for rows, pictures and explanations.
 #[derive(Clone, Debug)]
 pub struct Guidance {
-    /// The abstraction found in the scene; `None` when it has no such structure. A plan by
-    /// [`Route::Library`] does not depend on it.
-    pub abstraction: Option<Abstraction>,
     /// The preparatory pose driven to, in the problem's frame.
     pub preparatory: Option<Pose>,
     /// How the path came about.

@@ -133,12 +133,7 @@ impl GuidedPlanner {
 
     /// The plan by a manoeuvre of the library with this number, or by one curve straight to the
     /// goal where that costs less or no manoeuvre fits.
-    fn look_up(
-        &mut self,
-        library: usize,
-        problem: &Problem,
-        found: Option<Abstraction>,
-    ) -> Option<(Path, Guidance)> {
+    fn look_up(&mut self, library: usize, problem: &Problem) -> Attempt {
         let Self { libraries, library_search, verdicts, hars, .. } = self;
         let cost = hars.config().cost;
         verdicts.clear();
@@ -159,7 +154,7 @@ impl GuidedPlanner {
             (None, Some(leg)) => (leg.path, None, Route::Direct),
             (None, None) => return None,
         };
-        Some((path, Guidance { abstraction: found, preparatory, route }))
+        Some((path, Guidance { preparatory, route }))
     }
 
     /// The number of the library for `problem`, prepared if need be; `None` where nothing is known.
@@ -176,13 +171,14 @@ impl GuidedPlanner {
         (!self.libraries[at].1.is_empty()).then_some(at)
     }
 
-    fn plan_paper(
-        &mut self,
-        problem: &Problem,
-        found: &[Abstraction],
-        left: &mut usize,
-    ) -> Attempt {
-        let found = *found.first()?;
+    /// The cells found around the spot, the largest first.
+    fn cells(&self, problem: &Problem) -> Vec<Abstraction> {
+        let of_kind = |kind| abstractions(&problem.obstacles, kind, self.selector.grid());
+        problem.kind.map_or_else(Vec::new, of_kind)
+    }
+
+    fn plan_paper(&mut self, problem: &Problem, left: &mut usize) -> Attempt {
+        let found = *self.cells(problem).first()?;
         self.select(problem, &found, 1);
         let pose = *self.poses.first()?;
         if !problem.collision.pose_is_free(pose) {
@@ -194,7 +190,7 @@ impl GuidedPlanner {
         *left -= share - spend;
         let route = if spend == share { Route::Direct } else { Route::Searched };
         let path = path?;
-        Some((path, Guidance { abstraction: Some(found), preparatory: Some(pose), route }))
+        Some((path, Guidance { preparatory: Some(pose), route }))
     }
 
     /// From the start to `pose` and from there to the goal of the cell.
@@ -215,18 +211,17 @@ impl GuidedPlanner {
     fn plan_ranked(
         &mut self,
         problem: &Problem,
-        found: &[Abstraction],
         config: RankedConfig,
         left: &mut usize,
     ) -> Result<(Path, Guidance), NoPath> {
         let library = if config.library { self.library(problem) } else { None };
         if let Some(number) = library
-            && let Some(planned) = self.look_up(number, problem, found.first().copied())
+            && let Some(planned) = self.look_up(number, problem)
         {
             return Ok(planned);
         }
         let mut goal = self.hars.goal_set(problem);
-        for found in found.iter().take(config.abstractions) {
+        for found in self.cells(problem).iter().take(config.abstractions) {
             self.select(problem, found, config.candidates);
             let of_cell = self.hars.goal_set_of_cell(problem, found.shift);
             for i in 0..self.poses.len() {
@@ -238,7 +233,6 @@ impl GuidedPlanner {
             }
         }
         let guidance = |entry: Option<&Entry>, route| Guidance {
-            abstraction: found.first().copied(),
             preparatory: entry.filter(|e| e.preparatory).map(|e| e.pose),
             route,
         };
@@ -296,7 +290,7 @@ impl GuidedPlanner {
     ) -> Result<(Path, Guidance), NoPath> {
         let goal = self.hars.goal_set(problem);
         let leg = self.hars.leg(problem, problem.start, &goal, left)?;
-        let guidance = Guidance { abstraction: None, preparatory: None, route: Route::Fallback };
+        let guidance = Guidance { preparatory: None, route: Route::Fallback };
         Ok((leg.path, guidance))
     }
 }
@@ -310,16 +304,13 @@ impl Planner for GuidedPlanner {
     }
 
     fn plan(&mut self, problem: &Problem, budget: Budget) -> PlanResult {
-        let found = problem.kind.map_or_else(Vec::new, |kind| {
-            abstractions(&problem.obstacles, kind, self.selector.grid())
-        });
         let mut left = budget.max_expansions;
         let planned = match self.strategy {
-            Strategy::Paper => match self.plan_paper(problem, &found, &mut left) {
+            Strategy::Paper => match self.plan_paper(problem, &mut left) {
                 Some(planned) => Ok(planned),
                 None => self.fall_back(problem, &mut left),
             },
-            Strategy::Ranked(config) => self.plan_ranked(problem, &found, config, &mut left),
+            Strategy::Ranked(config) => self.plan_ranked(problem, config, &mut left),
         };
         let expansions = budget.max_expansions - left;
         match planned {
@@ -327,7 +318,7 @@ impl Planner for GuidedPlanner {
                 if guidance.route == Route::Fallback {
                     guidance.route = match problem.kind {
                         None => Route::NoSpot,
-                        Some(_) if found.is_empty() => Route::NoLane,
+                        Some(_) if self.cells(problem).is_empty() => Route::NoLane,
                         Some(_) => Route::Fallback,
                     };
                 }
