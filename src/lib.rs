@@ -47,3 +47,8 @@ pub mod selectors;
 pub mod training;
 pub mod vehicle;
 pub mod world;
+
+/// The programs in the README compile and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -8,12 +8,12 @@ use n3p::geometry::{Pose, signed_angle};
 use n3p::planners::HybridAStarConfig;
 use n3p::rng::{Stream, rng};
 use n3p::selectors::artefact::{Fault, Model, find_model};
-use n3p::selectors::fleet::FleetSelector;
+use n3p::selectors::fleet::{self, FleetHeader, FleetSelector, Scaling};
 use n3p::selectors::knn::KnnSelector;
 use n3p::selectors::knn_file;
 use n3p::selectors::mlp::MlpSelector;
-use n3p::selectors::network::{LAYERS, pose_from_outputs};
-use n3p::selectors::{Features, PoseSelector};
+use n3p::selectors::network::{LAYERS, LayerWeights, pose_from_outputs};
+use n3p::selectors::{Features, Normaliser, PoseSelector, UNIT_COUNT, UNIT_NAMES};
 use n3p::training::{self, Loss, MlpConfig, Targets, TrainingError, Validation};
 use n3p::vehicle::Vehicle;
 use n3p::world::ParkingType;
@@ -576,4 +576,57 @@ fn one_network_learns_from_several_vehicles_reproducibly() {
     flipped[bytes.len() - 100] ^= 1;
     let error = FleetSelector::from_bytes(&path, &flipped).unwrap_err().to_string();
     assert!(error.contains("checksum"), "{error}");
+}
+
+#[test]
+fn files_for_any_vehicle_say_what_is_wrong_with_them() {
+    let scaling = Scaling {
+        input: Normaliser { mean: vec![0.0; UNIT_COUNT], std: vec![1.0; UNIT_COUNT] },
+        output: Normaliser { mean: vec![0.0; 4], std: vec![1.0; 4] },
+    };
+    let good = FleetHeader {
+        format_version: fleet::VERSION,
+        fleet: vec![Vehicle::default()],
+        data_sha256: vec![],
+        kinds: vec![(KIND, 1, 1)],
+        grid: Grid::default(),
+        features: UNIT_NAMES.map(str::to_owned).to_vec(),
+        scaling: vec![scaling],
+        training: serde_json::Value::Null,
+        crate_version: String::new(),
+    };
+    let weights: Vec<LayerWeights> = fleet::UNIT_LAYERS
+        .windows(2)
+        .map(|size| LayerWeights { weight: vec![0.0; size[0] * size[1]], bias: vec![0.5; size[1]] })
+        .collect();
+    let path = Path::new("fleet.safetensors");
+    let read = |change: fn(&mut FleetHeader)| {
+        let mut header = good.clone();
+        change(&mut header);
+        let manoeuvre = vec![vec![Segment { curvature: 0.5, length: -1.0 }]];
+        FleetSelector::from_bytes(
+            path,
+            &fleet::encode(&header, &[manoeuvre], std::slice::from_ref(&weights)),
+        )
+    };
+    let fleet = read(|_| ()).unwrap();
+    let (start, vehicle) = (Pose::default(), Vehicle::default());
+    let features = Features::new(start, Grid::default().cell(KIND, 0));
+    let pose = fleet.predict(&features, &vehicle).unwrap();
+    assert!((pose.x - 0.5 * vehicle.turning_radius()).abs() < 1e-6, "{pose:?}");
+    let other = Features::new(start, Grid::default().cell(ParkingType::Reverse, 0));
+    assert!(fleet.predict(&other, &vehicle).is_none());
+    for (change, told) in [
+        ((|h| h.format_version = 1) as fn(&mut FleetHeader), "format version 1"),
+        (|h| h.features[2] = "colour".into(), "features: expected"),
+        (|h| h.scaling.clear(), "scaling: expected one for each type"),
+        (|h| h.scaling[0].input.std[3] = 0.0, "input normaliser: a std is 0"),
+        (|h| h.scaling[0].output.mean.truncate(2), "output normaliser: expected 4 columns"),
+        (|h| h.kinds[0].2 = 2, "tensor parallel.segments: expected F32 [2, 2]"),
+        (|h| h.grid.lane_width.step = 0.0, "grid.lane_width"),
+    ] {
+        let error = read(change).unwrap_err().to_string();
+        assert!(error.starts_with("model fleet.safetensors: "), "{error}");
+        assert!(error.contains(told), "{told}: {error}");
+    }
 }

@@ -13,7 +13,7 @@ use n3p::world::abstraction::abstractions;
 use n3p::world::cell::{Cell, Grid};
 use n3p::world::collision::CollisionWorld;
 use n3p::world::generate::{GeneratorConfig, generate};
-use n3p::world::{Level, ParkingType};
+use n3p::world::{Level, ParkingType, Scene};
 use std::path::Path;
 
 /// Whether a Reeds-Shepp curve, with a straight into the spot, leads from `pose` to the
@@ -133,4 +133,34 @@ fn settings_decide_what_is_tried_before_a_search() {
     assert!(
         RankedConfig { candidates: 0, ..all }.validate().unwrap_err().contains("candidates is 0")
     );
+}
+
+/// In real lots the known manoeuvres do not always do; then the curve straight to the goal is taken
+/// where it is free, as `ha-rs` takes it.
+#[test]
+fn where_known_manoeuvres_cannot_be_joined_the_curve_to_the_goal_serves() {
+    let lot = std::path::Path::new("../shared/scenes/dlp");
+    if !lot.exists() {
+        eprintln!("no real scenes here: skipped");
+        return;
+    }
+    let models = Models::load(&["models/knn-tpcap.bin"]).unwrap();
+    let [mut n3p, mut hars] =
+        [Method::N3p, Method::HaRs].map(|m| m.build(&models, &MethodSettings::default()).unwrap());
+    let mut direct = 0;
+    for scene in Scene::read_dir(lot).unwrap() {
+        let problem = Problem::new(&scene).unwrap();
+        let budget = Budget { max_expansions: 200_000 };
+        let ours = n3p.plan(&problem, budget);
+        let path = ours.outcome.unwrap_or_else(|e| panic!("{}: {e}", scene.name));
+        let guidance = ours.guidance.unwrap();
+        let theirs = hars.plan(&problem, budget);
+        if guidance.route == Route::Direct && guidance.preparatory.is_none() {
+            direct += 1;
+            assert_eq!(Ok(path), theirs.outcome, "{}", scene.name);
+        } else if theirs.expansions == 0 {
+            assert_eq!(ours.expansions, 0, "{}: a search where one curve does", scene.name);
+        }
+    }
+    assert!(direct > 0);
 }

@@ -82,8 +82,14 @@ fn main() -> ExitCode {
 
 fn evaluate(args: &Args) -> Result<ExitCode> {
     let policy = args.policy.as_deref().map(|p| PolicySource::new(p, args.policy_limit));
+    let vehicle = match &args.vehicle {
+        Some(path) => Some(Vehicle::read(path).or_bad_input()?),
+        None => None,
+    };
     let models = match &args.models[..] {
-        [] => Models::usual(&args.methods, None),
+        // Scenes have vehicles of their own.
+        [] if args.scenes.is_some() => Models::usual(&args.methods, None),
+        [] => Models::usual(&args.methods, Some(&vehicle.unwrap_or_default())),
         given => Models::load(given),
     };
     let models = models.or_bad_input()?.with_policy(policy.transpose().or_bad_input()?);
@@ -102,7 +108,8 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
         return Err(BadInput(text.to_owned()).into());
     }
     config.build_all(&models).or_bad_input()?;
-    let (cases, scenes) = cases(args, &config.methods, &models)?;
+    let vehicle = vehicle.or(models.vehicle()).unwrap_or_default();
+    let (cases, scenes) = cases(args, &vehicle, &config.methods, &models)?;
     suite::check(&cases, &models, &config).or_bad_input()?;
     let mut outputs = Outputs::create(args.out.as_deref(), args.paths.as_deref()).or_bad_input()?;
 
@@ -140,25 +147,26 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
 }
 
 /// The scenes, and what to call them in the report.
-fn cases(args: &Args, methods: &[Method], models: &Models) -> Result<(Vec<Case>, String)> {
+fn cases(
+    args: &Args,
+    vehicle: &Vehicle,
+    methods: &[Method],
+    models: &Models,
+) -> Result<(Vec<Case>, String)> {
     if let Some(dir) = &args.scenes {
         let cases = suite::from_folder(dir, args.kind).or_bad_input()?;
         let title = format!("{} from {}", cases.len(), dir.display());
         return Ok((cases, title));
     }
     // Without --type: all that the models of the chosen methods know.
-    let vehicle = match &args.vehicle {
-        Some(path) => Vehicle::read(path).or_bad_input()?,
-        None => models.vehicle().unwrap_or_default(),
-    };
     let known =
-        |k: &ParkingType| methods.iter().all(|m| models.check_kind(*m, &vehicle, *k).is_ok());
+        |k: &ParkingType| methods.iter().all(|m| models.check_kind(*m, vehicle, *k).is_ok());
     let kinds = match args.kind {
         Some(kind) => vec![kind],
         None => ParkingType::ALL.into_iter().filter(known).collect(),
     };
     let levels = args.level.map_or(Level::ALL.to_vec(), |l| vec![l]);
-    let cases = suite::generated(&vehicle, &kinds, &levels, args.count as usize, args.seed)
+    let cases = suite::generated(vehicle, &kinds, &levels, args.count as usize, args.seed)
         .or_bad_input()?;
     let title = format!(
         "{} generated, {} of each type and level, seed {}",

@@ -209,9 +209,19 @@ fn fleet(args: &FleetArgs) -> anyhow::Result<ExitCode> {
     let sets = sets.collect::<anyhow::Result<Vec<_>>>()?;
     for (i, (set, folder)) in sets.iter().zip(&args.data).enumerate() {
         let bad = |what: String| BadInput(format!("--data {}: {what}", folder.display()));
-        let solved = |kind| set.solved().any(|s| s.cell.kind == kind);
-        if let Some(kind) = ParkingType::ALL.into_iter().find(|k| !solved(*k)) {
-            return Err(bad(format!("it has no solved sample of type {kind}; collect some")).into());
+        let solved = |kind| set.solved().filter(|s| s.cell.kind == kind).count();
+        let least = training::mlp::LEAST_SAMPLES;
+        if let Some(kind) = ParkingType::ALL.into_iter().find(|k| solved(*k) < least) {
+            let count = solved(kind);
+            let text =
+                format!("it has {count} solved samples of type {kind}; at least {least} needed");
+            return Err(bad(text).into());
+        }
+        if set.metadata.grid != sets[0].metadata.grid {
+            let first = args.data[0].display();
+            return Err(
+                bad(format!("its grid is not that of {first}; collect with one grid")).into()
+            );
         }
         let like = |other: &Dataset| other.metadata.vehicle.is_like(&set.metadata.vehicle);
         if let Some(other) = sets[..i].iter().position(like) {

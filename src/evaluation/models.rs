@@ -51,8 +51,8 @@ pub enum ModelsError {
     /// Two KNN files were given.
     #[error("--model {0}: a KNN model was given before; one file holds all types: give one")]
     TwoKnn(PathBuf),
-    /// Two files of manoeuvres for any vehicle were given.
-    #[error("--model {0}: manoeuvres for any vehicle were given before; give one")]
+    /// Two models for any vehicle were given.
+    #[error("--model {0}: a model for any vehicle was given before; give one")]
     TwoFleets(PathBuf),
     /// Two policies of one course were given.
     #[error("--model {path}: a policy of rl-{course} was given before; give one")]
@@ -188,7 +188,11 @@ impl Models {
                 }
             }
         }
-        let serves = |&&m: &&Method| vehicle.is_some_and(|v| models.serving(m, v).is_some());
+        let serves = |&&m: &&Method| {
+            let own = vehicle.and_then(|v| models.serving(m, v));
+            own.and_then(|own| own.selector(m))
+                .is_some_and(|s| s.kinds().len() == ParkingType::ALL.len())
+        };
         let any = find_model("fleet.safetensors");
         let mut use_it = methods.iter().filter(|m| matches!(m, Method::N3p | Method::MlpN3p));
         if any.exists() && !use_it.all(|m| serves(&m)) {

@@ -26,7 +26,7 @@ pub struct SpotReport {
     pub spot_width_m: Option<f64>,
     /// From the spot's centre along the lane to its end; the model's largest stands for none.
     pub dead_end_m: Option<f64>,
-    /// Corners of the lane and of the spot that the plan was looked for in.
+    /// Corners of the largest lane and of the spot, as the model's grid has them.
     pub lane_and_spot: Option<[Vec<[f64; 2]>; 2]>,
     /// The preparatory pose.
     pub preparatory: Option<Pose>,

@@ -233,17 +233,17 @@ impl LibrarySearch {
 
 impl LookUp<'_> {
     /// The next plan in order of estimated cost that is free, costs less than `bound` and little
-    /// more than estimated. Goes on after as many free manoeuvres as are asked for in `tries`, none
-    /// of which could be joined, when called again.
+    /// more than estimated. Gives up after `tries` free manoeuvres that cannot be joined like that;
+    /// when called again it goes on from there.
     pub fn next(&mut self, bound: f64, tries: usize) -> Option<LibraryPlan> {
         let last = self.search.free.len().saturating_add(tries);
         while self.search.free.len() < last {
-            let Reverse(candidate) = self.search.queue.pop()?;
+            let &Reverse(candidate) = self.search.queue.peek()?;
             if candidate.estimate() >= bound {
                 // So do all others.
-                self.search.queue.clear();
                 return None;
             }
+            self.search.queue.pop();
             if self.verdicts.is_free(self.library, candidate.index(), self.problem) {
                 self.search.free.push(candidate);
                 let plan = self.join(candidate, bound.min(candidate.window()));
@@ -255,8 +255,8 @@ impl LookUp<'_> {
         None
     }
 
-    /// The first plan by one of the first `tries` free manoeuvres that [`LookUp::next`] could not
-    /// join, whose curve may be as long as `bound` allows.
+    /// The first plan by one of the first `tries` manoeuvres that [`LookUp::next`] found free, whose
+    /// curve may be as long as `bound` allows. For when none of them could be joined otherwise.
     pub fn long_way(&mut self, bound: f64, tries: usize) -> Option<LibraryPlan> {
         let tries = tries.min(self.search.free.len());
         (0..tries).find_map(|i| {
@@ -367,8 +367,16 @@ mod tests {
                 let mut new = Verdicts::default();
                 let mut look_up =
                     search.look_up(&library, &mut new, &problem, &config.cost, f64::INFINITY);
+                // Nothing costs less than nothing: what is left out then is found afterwards.
+                assert!(look_up.next(0.0, usize::MAX).is_none());
                 let parts = (0..library.len()).find_map(|_| look_up.next(f64::INFINITY, 1));
-                assert!(parts.is_none_or(|p| p == plan));
+                match parts {
+                    Some(parts) => assert_eq!(parts, plan),
+                    None => {
+                        let around = look_up.long_way(f64::INFINITY, usize::MAX);
+                        assert_eq!(around.as_ref(), Some(&plan));
+                    }
+                }
                 let near = |s: &crate::curves::Sample| s.pose.distance(plan.preparatory) < 0.03;
                 assert!(plan.path.sample(0.05).iter().any(near));
                 assert!(PlanResult::certified(&problem, plan.path, 0).outcome.is_ok());

@@ -1,7 +1,7 @@
 //! Model files: finding, recognising, checking, writing.
 //!
-//! Two kinds exist, told apart by content: `knn.bin` (see [`super::knn_file`]) and one
-//! safetensors file per network (see [`super::mlp`]). Nothing is used before magic,
+//! They are told apart by content: `knn.bin` (see [`super::knn_file`]), one safetensors file per
+//! network (see [`super::mlp`]), and one for any vehicle (see [`super::fleet`]). Nothing is used before magic,
 //! version, checksum, shapes and vehicle are checked; every [`ArtefactError`] names the
 //! file, what is wrong with it and what would mend it. Files are written aside, synced
 //! and renamed, so that a reader never sees half a model.
@@ -82,7 +82,7 @@ pub enum Fault {
     Shape {
         /// Name of the tensor.
         tensor: String,
-        /// Type and shape of the paper's network.
+        /// Type and shape that it should have.
         expected: String,
         /// What the file holds.
         got: String,
@@ -132,8 +132,8 @@ pub enum Model {
     Knn(KnnSelector),
     /// A network of one parking type.
     Mlp(MlpSelector),
-    /// Manoeuvres for any vehicle.
-    Fleet(FleetSelector),
+    /// Manoeuvres and networks for any vehicle.
+    Fleet(Box<FleetSelector>),
 }
 
 impl Model {
@@ -158,7 +158,9 @@ impl Model {
             Ok(()) if brace == *b"{" => {
                 let bytes = std::fs::read(path).map_err(|e| Fault::Unreadable(e).of(path))?;
                 match Content::of_file(&bytes) {
-                    Content::Fleet => Ok(Model::Fleet(FleetSelector::from_bytes(path, &bytes)?)),
+                    Content::Fleet => {
+                        Ok(Model::Fleet(Box::new(FleetSelector::from_bytes(path, &bytes)?)))
+                    }
                     Content::Mlp | Content::Policy => Ok(Model::Mlp(MlpSelector::load(path)?)),
                 }
             }
@@ -214,7 +216,7 @@ impl Model {
         match self {
             Model::Knn(m) => Arc::new(m),
             Model::Mlp(m) => Arc::new(m),
-            Model::Fleet(m) => Arc::new(m),
+            Model::Fleet(m) => Arc::new(*m),
         }
     }
 }

@@ -6,7 +6,8 @@ use crate::world::cell::{Cell, Grid};
 
 /// What a selector sees (paper, eq. 6): the start in the spot frame and the cell.
 ///
-/// Defined once: Parquet columns, normaliser and tensors all follow [`Features::NAMES`].
+/// Defined once: Parquet columns, and normaliser and tensors of the models for one vehicle, all
+/// follow [`Features::NAMES`]; those for any vehicle follow [`UNIT_NAMES`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Features {
     /// Rear-axle start, spot frame; heading in (−π, π].

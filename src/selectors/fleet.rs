@@ -44,6 +44,8 @@ pub struct FleetHeader {
     pub data_sha256: Vec<String>,
     /// The parking types, and the manoeuvres and segments of each.
     pub kinds: Vec<(ParkingType, usize, usize)>,
+    /// The grid of cells of all data sets.
+    pub grid: Grid,
     /// Names of the networks' inputs, [`UNIT_NAMES`].
     pub features: Vec<String>,
     /// Scaling of each type's network.
@@ -81,7 +83,6 @@ pub struct FleetSelector {
     header: FleetHeader,
     /// In the order of the header's types.
     kinds: Vec<OfKind>,
-    grid: Grid,
 }
 
 /// Widths of the networks' layers.
@@ -118,6 +119,7 @@ impl FleetSelector {
         let damaged = |e: String| Fault::Header(e);
         let header: FleetHeader =
             serde_json::from_str(&json).map_err(|e| damaged(e.to_string()))?;
+        header.grid.validate().map_err(|e| damaged(e.to_string()))?;
         if header.features != UNIT_NAMES {
             let found = &header.features;
             return Err(damaged(format!("features: expected {UNIT_NAMES:?}, got {found:?}")));
@@ -150,7 +152,7 @@ impl FleetSelector {
             let network = Network::new(UNIT_COUNT, &weights);
             kinds.push(OfKind { manoeuvres: each.collect(), network });
         }
-        Ok(Self { path: path.to_owned(), header, kinds, grid: Grid::default() })
+        Ok(Self { path: path.to_owned(), header, kinds })
     }
 
     /// The file it was loaded from.
@@ -168,7 +170,7 @@ impl FleetSelector {
     pub fn predict(&self, features: &Features, vehicle: &Vehicle) -> Option<Pose> {
         let at = self.position(features.cell.kind)?;
         let Scaling { input, output } = &self.header.scaling[at];
-        let input = input.normalise(features.unit_values(&self.grid, vehicle));
+        let input = input.normalise(features.unit_values(&self.header.grid, vehicle));
         let pose = pose_from_outputs(output.restore(self.kinds[at].network.forward(&input)));
         Some(in_metres(pose, vehicle))
     }
@@ -210,7 +212,7 @@ impl PoseSelector for FleetSelector {
     }
 
     fn grid(&self) -> &Grid {
-        &self.grid
+        &self.header.grid
     }
 
     fn kinds(&self) -> Vec<ParkingType> {

@@ -3,8 +3,9 @@
 //! [`GuidedPlanner::paper`] is the paper's Algorithm 1: abstraction → cell → one pose →
 //! HARS to the pose → HARS from the pose to the goal. [`GuidedPlanner::ranked`] is ours: the
 //! manoeuvres the selector knows are ranked, and the first that is free and that a free curve
-//! joins is the plan, without any search. Where there is none, several poses of the selector
-//! are tried, then one search goes to the goal or any of these poses.
+//! joins is the plan, without any search. Where the first few cannot be joined, the curve straight
+//! to the goal is one more way. Where there is none, several poses of the selector are tried, then
+//! one search goes to the goal or any of these poses.
 //! Either way the path leaves certified by the exact swept check.
 
 use std::sync::Arc;
@@ -28,7 +29,7 @@ use super::{Features, PoseSelector};
 const LEG_EXPANSIONS: usize = 5_000;
 /// Known manoeuvres, free in the scene, that `n3p` tries to join before it asks for the curve
 /// straight to the goal, and then once more for something cheaper: most plans take the first.
-const FIRST_TRIES: usize = 8;
+const FIRST_TRIES: usize = 16;
 /// Those it tries where there is no such curve. Each takes some microseconds, together they take a
 /// quarter of what a search usually does; generated scenes need 24 of them at most.
 const TRIES: usize = 64;
@@ -131,8 +132,8 @@ impl GuidedPlanner {
         }
     }
 
-    /// The plan by a manoeuvre of the library with this number, or by one curve straight to the
-    /// goal where that costs less or no manoeuvre fits.
+    /// The plan by a manoeuvre of the library with this number. Where the first free ones cannot be
+    /// joined, one curve straight to the goal is asked for, too, and the cheaper plan taken.
     fn look_up(&mut self, library: usize, problem: &Problem) -> Attempt {
         let Self { libraries, library_search, verdicts, hars, .. } = self;
         let cost = hars.config().cost;
@@ -237,9 +238,10 @@ impl GuidedPlanner {
             route,
         };
         // Who looked plans up has tried the curve straight to the goal.
-        let untried = if library.is_some() { goal.only_preparatory() } else { Some(goal.clone()) };
+        let preparatory = if library.is_some() { goal.only_preparatory() } else { None };
+        let untried = if library.is_some() { preparatory.as_ref() } else { Some(&goal) };
         if let Some(untried) = untried
-            && let Some(leg) = self.hars.direct(problem, problem.start, &untried)
+            && let Some(leg) = self.hars.direct(problem, problem.start, untried)
         {
             return Ok((leg.path, guidance(untried.entries().get(leg.entry), Route::Direct)));
         }

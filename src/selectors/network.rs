@@ -33,7 +33,7 @@ pub struct LayerWeights {
     pub bias: Vec<f32>,
 }
 
-/// A pose as the network's raw outputs: metres, metres, cosine, sine.
+/// A pose as the network's raw outputs: the position in its own unit, cosine, sine.
 pub fn outputs_from_pose(pose: Pose) -> [f32; OUTPUTS] {
     let (sin, cos) = pose.sin_cos();
     [pose.x, pose.y, cos, sin].map(|v| v as f32)

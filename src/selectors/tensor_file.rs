@@ -170,7 +170,7 @@ pub enum Content {
     Mlp,
     /// A driving policy.
     Policy,
-    /// Manoeuvres for any vehicle.
+    /// Manoeuvres and networks for any vehicle.
     Fleet,
 }
 

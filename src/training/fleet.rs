@@ -62,22 +62,26 @@ pub struct FleetKindLog {
     pub reach: Reach,
 }
 
-/// Condenses the samples of `sets`, one of each vehicle, into the model `out`, and trains its
-/// networks; log, model card and loss curves are written beside it.
+/// Condenses the samples of `sets`, one of each vehicle and all of one grid, into the model `out`,
+/// and trains its networks; log, model card and loss curves are written beside it.
+///
+/// # Panics
+///
+/// Without a data set.
 pub fn train(sets: &[Dataset], config: &MlpConfig, out: &Path) -> Result<FleetLog, TrainingError> {
     config.validate()?;
-    let condensed: Vec<Result<_, TrainingError>> = std::thread::scope(|scope| {
-        let condense = |kind| move || solved_of(sets, kind).map(|all| manoeuvres(sets, kind, &all));
-        let running = ParkingType::ALL.map(|kind| scope.spawn(condense(kind)));
-        running.into_iter().map(|r| r.join().expect("learning does not panic")).collect()
+    let mut solved = Vec::new();
+    for kind in ParkingType::ALL {
+        solved.push((kind, solved_of(sets, kind)?));
+    }
+    let condensed: Vec<UnitManoeuvres> = std::thread::scope(|scope| {
+        let condense = |(kind, of_sets)| scope.spawn(move || manoeuvres(sets, kind, of_sets));
+        let running: Vec<_> = solved.iter().map(|(k, of_sets)| condense((*k, of_sets))).collect();
+        running.into_iter().map(|r| r.join().expect("condensing does not panic")).collect()
     });
-    let condensed: Vec<UnitManoeuvres> = condensed.into_iter().collect::<Result<_, _>>()?;
     let (mut scaling, mut networks, mut logs) = (Vec::new(), Vec::new(), Vec::new());
-    for (kind, manoeuvres) in ParkingType::ALL.into_iter().zip(&condensed) {
-        let learnt = learn(sets, kind, config, manoeuvres.len())?;
-        let picture = curve::svg(&format!("fleet, {kind}: loss"), &learnt.log.losses)?;
-        let name = format!("{kind}.training.svg");
-        artefact::write(&out.with_extension(name), picture.as_bytes())?;
+    for ((kind, of_sets), manoeuvres) in solved.iter().zip(&condensed) {
+        let learnt = learn(sets, *kind, of_sets, config, manoeuvres.len())?;
         scaling.push(learnt.scaling);
         networks.push(learnt.weights);
         logs.push(learnt.log);
@@ -89,6 +93,7 @@ pub fn train(sets: &[Dataset], config: &MlpConfig, out: &Path) -> Result<FleetLo
         fleet: sets.iter().map(|s| s.metadata.vehicle).collect(),
         data_sha256: sets.iter().map(|s| s.content_sha256(&ParkingType::ALL)).collect(),
         kinds: kinds.map(|(kind, m)| (kind, m.len(), count(m))).collect(),
+        grid: sets[0].metadata.grid,
         features: UNIT_NAMES.map(str::to_owned).to_vec(),
         scaling,
         training: serde_json::to_value(config).expect("settings are plain data"),
@@ -100,6 +105,11 @@ pub fn train(sets: &[Dataset], config: &MlpConfig, out: &Path) -> Result<FleetLo
     let (config, bytes) = (config.clone(), bytes.len());
     let log = FleetLog { fleet, data_sha256, config, kinds: logs, bytes };
     write_beside(out, &log, card::fleet(out, &log))?;
+    for FleetKindLog { kind, losses, .. } in &log.kinds {
+        let picture = curve::svg(&format!("fleet, {kind}: loss"), losses)?;
+        let name = format!("{kind}.training.svg");
+        artefact::write(&out.with_extension(name), picture.as_bytes())?;
+    }
     Ok(log)
 }
 
@@ -137,12 +147,12 @@ struct Learnt {
 fn learn(
     sets: &[Dataset],
     kind: ParkingType,
+    solved: &[Vec<&Sample>],
     config: &MlpConfig,
     manoeuvres: usize,
 ) -> Result<Learnt, TrainingError> {
     let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
-    let all = solved_of(sets, kind)?;
-    let parts = sets.iter().zip(&all).map(|(set, solved)| {
+    let parts = sets.iter().zip(solved).map(|(set, solved)| {
         let (train, validation) =
             split(targets::examples(&set.metadata, solved, config, threads), config);
         Part { set, train, validation }
@@ -154,26 +164,25 @@ fn learn(
     let [train, validation] = [train, validation]
         .map(|(inputs, outputs)| Rows::new(&inputs, &outputs, &scaling.input, &scaling.output));
     let model = Trainable::new(&UNIT_LAYERS, config.seed)?;
-    let judged = || {
-        let predicted = predictions(&model, &validation, &scaling.output)?;
-        Ok::<_, TrainingError>(judge(&parts, &predicted))
-    };
-    let (mut weights, mut quality, mut best_epoch) = (model.weights()?, judged()?, 0);
+    let mut best = None;
     let losses = fit(&model, &train, &validation, config, kind.name(), |losses| {
-        (weights, quality, best_epoch) = (model.weights()?, judged()?, losses.len());
-        let (Errors { position_median_m: median, .. }, reach) = quality;
-        Ok(format!("median {median:.2} m, direct {:.0} %", 100.0 * reach.direct))
+        let predicted = predictions(&model, &validation, &scaling.output)?;
+        let (errors, reach) = judge(&parts, &predicted);
+        best = Some((model.weights()?, losses.len(), errors, reach));
+        let (median, direct) = (errors.position_median_m, 100.0 * reach.direct);
+        Ok(format!("median {median:.2} m, direct {direct:.0} %"))
     })?;
+    let (weights, best_epoch, errors, reach) = best.expect("any loss is better than none");
     let log = FleetKindLog {
         kind,
-        samples: all.iter().map(Vec::len).sum(),
+        samples: solved.iter().map(Vec::len).sum(),
         manoeuvres,
         train_rows: train.len(),
         validation_rows: validation.len(),
         losses,
         best_epoch,
-        validation: quality.0,
-        reach: quality.1,
+        validation: errors,
+        reach,
     };
     Ok(Learnt { scaling, weights, log })
 }

@@ -27,7 +27,7 @@ use crate::selectors::{Features, Normaliser};
 use crate::world::ParkingType;
 
 /// Fewest solved samples worth training on.
-pub(super) const LEAST_SAMPLES: usize = 10;
+pub const LEAST_SAMPLES: usize = 10;
 
 /// The training's log, written as JSON beside the model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -71,8 +71,13 @@ impl Surroundings {
     /// Adds the edges of a polygon. Points come after all polygons.
     pub fn add_polygon(&mut self, edges: impl Iterator<Item = (Vec2, Vec2)>) {
         let first = self.edges.len();
+        debug_assert_eq!(first, self.points_begin(), "points come after all polygons");
         self.edges.extend(edges);
         self.polygons.push(first..self.edges.len());
+    }
+
+    fn points_begin(&self) -> usize {
+        self.polygons.last().map_or(0, |p| p.end)
     }
 
     /// Adds a point.
@@ -123,8 +128,7 @@ impl Surroundings {
                 }
             }
         }
-        let points = self.polygons.last().map_or(0, |p| p.end);
-        for (p, _) in &self.edges[points..] {
+        for (p, _) in &self.edges[self.points_begin()..] {
             if p.x > x_min && p.x < x_max && p.y < boundary + MAX_SHIFT {
                 top = top.max(p.y);
             }
