@@ -29,6 +29,7 @@ fn draw(
     let (low, high) = values.fold((f32::MAX, f32::MIN_POSITIVE), |(low, high), v| {
         (low.min(v.max(f32::MIN_POSITIVE)), high.max(v))
     });
+    let (low, high) = with_a_label(low.min(high) * 0.8, high * 1.25);
     let root = SVGBackend::with_string(text, (800, 500)).into_drawing_area();
     root.fill(&WHITE)?;
     let mut chart = ChartBuilder::on(&root)
@@ -36,11 +37,12 @@ fn draw(
         .margin(12)
         .x_label_area_size(40)
         .y_label_area_size(70)
-        .build_cartesian_2d(
-            1..losses.len().max(2),
-            (low.min(high) * 0.8..high * 1.25).log_scale(),
-        )?;
-    chart.configure_mesh().x_desc("epoch").y_desc("loss").draw()?;
+        .build_cartesian_2d(1..losses.len().max(2), (low..high).log_scale())?;
+    let label = |v: &f32| {
+        let digits = (-v.log10().floor()).max(0.0) as usize;
+        format!("{v:.digits$}")
+    };
+    chart.configure_mesh().x_desc("epoch").y_desc("loss").y_label_formatter(&label).draw()?;
     for (name, colour) in [("training", BLUE), ("validation", RED)] {
         let value = |l: &EpochLoss| if name == "training" { l.train } else { l.validation };
         let points = losses.iter().enumerate().map(|(i, l)| (i + 1, value(l)));
@@ -52,6 +54,18 @@ fn draw(
     chart.configure_series_labels().background_style(WHITE.mix(0.8)).border_style(BLACK).draw()?;
     root.present()?;
     Ok(())
+}
+
+/// The range from `low` to `high`, widened to the nearest power of ten where it holds none: these
+/// are what a logarithmic axis has labels at.
+fn with_a_label(low: f32, high: f32) -> (f32, f32) {
+    let below = 10_f32.powf(high.log10().floor());
+    let above = 10_f32.powf(low.log10().ceil());
+    match () {
+        () if below >= low => (low, high),
+        () if low / below < above / high => (0.9 * below, high),
+        () => (low, 1.1 * above),
+    }
 }
 
 #[cfg(test)]
@@ -66,5 +80,15 @@ mod tests {
         let text = svg("mlp parallel", &losses).unwrap();
         assert!(text.starts_with("<svg") && text.contains("validation") && text.contains("epoch"));
         assert!(svg("one epoch", &losses[..1]).is_ok());
+    }
+
+    #[test]
+    fn every_axis_has_a_label() {
+        for (values, label) in [([0.015, 0.03], "0.01"), ([0.05, 0.07], "0.1"), ([3.0, 0.5], "1")] {
+            let losses = values.map(|v| EpochLoss { train: v, validation: v });
+            let text = svg("", &losses).unwrap();
+            let line = text.lines().any(|l| l.trim() == label);
+            assert!(line, "{values:?}: no label {label} in {text}");
+        }
     }
 }
