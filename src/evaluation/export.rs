@@ -108,13 +108,13 @@ pub(super) fn snap(pose: Pose, exact: Pose) -> Pose {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::curves::Segment;
     use crate::vehicle::Vehicle;
 
-    #[test]
-    fn ends_are_the_scenes_own_numbers() {
+    /// A plan forward to the left and back, in a mirrored frame far from the origin, and its scene.
+    pub fn far_and_mirrored() -> (Scene, Frame, Path) {
         let frame = Frame { origin_in_world: Pose::new(5e5, -3e5, 2.0), mirrored: true };
         let path = Path::new(
             Pose::new(3.0, 4.0, 0.2),
@@ -133,6 +133,12 @@ mod tests {
             points: vec![],
             bounds: None,
         };
+        (scene, frame, path)
+    }
+
+    #[test]
+    fn ends_are_the_scenes_own_numbers() {
+        let (scene, frame, path) = far_and_mirrored();
         let file = PathFile::new(&scene, &frame, &path, "ha-rs");
         assert_eq!(file.poses[0], <[f64; 3]>::from(scene.start));
         assert_eq!(*file.poses.last().unwrap(), <[f64; 3]>::from(scene.goal));

@@ -124,28 +124,11 @@ fn columns<S: Serializer>(moments: &[Moment], serializer: S) -> Result<S::Ok, S:
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::curves::Segment;
-    use crate::geometry::Pose;
+    use crate::evaluation::export::tests::far_and_mirrored;
 
     #[test]
     fn mirrored_plans_are_driven_in_the_scenes_frame() {
-        let frame = Frame { origin_in_world: Pose::new(5e5, -3e5, 2.0), mirrored: true };
-        let segments = [(0.2, 3.0), (0.0, -2.0)];
-        let segments = segments.map(|(curvature, length)| Segment { curvature, length });
-        let path = Path::new(Pose::new(3.0, 4.0, 0.2), segments);
-        let mut start = frame.world_from_local(path.start);
-        start.heading += std::f64::consts::TAU;
-        let scene = Scene {
-            name: "s".into(),
-            source: String::new(),
-            vehicle: Vehicle::default(),
-            start,
-            goal: frame.world_from_local(path.end()),
-            parking_type: None,
-            obstacles: vec![],
-            points: vec![],
-            bounds: None,
-        };
+        let (scene, frame, path) = far_and_mirrored();
         let limits = TrajectoryLimits::default();
         let file = TrajectoryFile::new(&scene, &frame, &path, "ha-rs", limits).unwrap();
         let moments = &file.moments;
