@@ -10,6 +10,7 @@ use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::dataset::Dataset;
 use n3p::rl::courses::{Course, Stratum};
 use n3p::selectors::artefact;
+use n3p::training::quality::{Errors, Reach};
 use n3p::training::rl::{Begin, RlConfig};
 use n3p::training::{self, MlpConfig, TrainingError};
 use n3p::world::ParkingType;
@@ -159,20 +160,27 @@ fn mlp(args: &MlpArgs) -> anyhow::Result<ExitCode> {
         let log = training::mlp::train(metadata, samples, kind, &config, &out)
             .map_err(|e| exit_code(e, &args.common.data))?;
         cli::print(format!(
-            "{}: {} rows, best of {} epochs is {}; on {} unseen rows the median error is {:.2} m, \
-             {:.1}°; {:.0} % have a free curve to the goal, {:.0} % one from the start, too",
+            "{}: {} rows, best of {} epochs is {}; {}",
             out.display(),
             log.train_rows,
             log.losses.len(),
             log.best_epoch,
-            log.validation_rows,
-            log.validation.position_median_m,
-            log.validation.heading_median_rad.to_degrees(),
-            100.0 * log.reach.to_goal,
-            100.0 * log.reach.direct,
+            quality(log.validation_rows, &log.validation, &log.reach),
         ))?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// How good a network is on `rows` kept apart.
+fn quality(rows: usize, errors: &Errors, reach: &Reach) -> String {
+    format!(
+        "on {rows} unseen rows the median error is {:.2} m, {:.1}°; {:.0} % have a free curve to the \
+         goal, {:.0} % one from the start, too",
+        errors.position_median_m,
+        errors.heading_median_rad.to_degrees(),
+        100.0 * reach.to_goal,
+        100.0 * reach.direct,
+    )
 }
 
 /// The settings of a file, or the usual ones, with another seed if asked for.
@@ -234,16 +242,11 @@ fn fleet(args: &FleetArgs) -> anyhow::Result<ExitCode> {
     })?;
     for k in &log.kinds {
         cli::print(format!(
-            "{}: {} manoeuvres from {} samples; on {} unseen rows the network's median error is \
-             {:.2} m, {:.1}°; {:.0} % have a free curve to the goal, {:.0} % one from the start, too",
+            "{}: {} manoeuvres from {} samples; {}",
             k.kind,
             k.manoeuvres,
             k.samples,
-            k.validation_rows,
-            k.validation.position_median_m,
-            k.validation.heading_median_rad.to_degrees(),
-            100.0 * k.reach.to_goal,
-            100.0 * k.reach.direct,
+            quality(k.validation_rows, &k.validation, &k.reach),
         ))?;
     }
     cli::print(format!(
