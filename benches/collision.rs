@@ -47,7 +47,7 @@ fn as_points(obstacles: &Obstacles) -> Obstacles {
         let n = ((b - a).norm() / 0.05).ceil() as usize;
         (0..n).map(move |i| a + (b - a) * (i as f64 / n as f64))
     };
-    Obstacles { polygons: Vec::new(), points: obstacles.edges().flat_map(along).collect() }
+    Obstacles::new(vec![], vec![], obstacles.edges().flat_map(along).collect()).unwrap()
 }
 
 fn bench(c: &mut Criterion) {
@@ -56,7 +56,7 @@ fn bench(c: &mut Criterion) {
     let points = as_points(&problem.obstacles);
     let dense = CollisionWorld::new(&points, None, &vehicle, Problem::MARGIN);
     let (sweeps, poses) = (primitives(&vehicle), free_poses(full));
-    println!("full: {} edges; dense: {} points", full_edges(&problem), points.points.len());
+    println!("full: {} edges; dense: {} points", full_edges(&problem), points.points().len());
 
     let mut group = c.benchmark_group("swept_check");
     for (name, world) in [("full", full), ("dense", &dense)] {

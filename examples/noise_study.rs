@@ -119,7 +119,8 @@ impl<'a> Seen<'a> {
         let mut rng = rng(seed, Stream::Noise, index);
         let mut draw = || [(); 2].map(|()| rng.sample(StandardNormal));
         let (mut points, mut errors) = (Vec::new(), Vec::new());
-        for polygon in &truth.geometry().polygons {
+        let obstacles = truth.geometry().expect("generated scenes are valid");
+        for polygon in obstacles.polygons() {
             let shared = draw();
             for (a, b) in polygon.edges() {
                 let steps = ((b - a).norm() / SPACING).ceil().max(1.0);

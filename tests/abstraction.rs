@@ -28,26 +28,29 @@ fn region_is_free(region: &Aabb, obstacles: &Obstacles) -> bool {
         query::intersection_test(&at, &cuboid, &ParryPose::default(), &hull).unwrap().intersecting
     };
     let inside = |p: &Vec2| region.inflated(-SHRINK).contains(*p);
-    !obstacles.polygons.iter().any(hit) && !obstacles.points.iter().any(inside)
+    !obstacles.polygons().iter().any(hit) && !obstacles.points().iter().any(inside)
 }
 
 /// Boxes at any angle and points, anywhere but on the parked car.
 fn clutter(rng: &mut impl Rng, vehicle: &Vehicle, goal: Pose) -> Obstacles {
-    let mut obstacles = Obstacles::default();
+    let (mut polygons, mut points) = (Vec::new(), Vec::new());
     for _ in 0..rng.random_range(0..12) {
         let (x, y) = (rng.random_range(-14.0..14.0), rng.random_range(-5.0..12.0));
         let at = Pose::new(x, y, rng.random_range(-3.2..3.2));
         let (a, b) = (rng.random_range(0.05..3.0), rng.random_range(0.05..1.5));
         if rng.random_bool(0.3) {
-            obstacles.points.push(at.position());
+            points.push(at.position());
         } else {
-            obstacles.polygons.push(Polygon::rectangle(at, Aabb::new(-a, -b, a, b)));
+            polygons.push(Polygon::rectangle(at, Aabb::new(-a, -b, a, b)));
         }
     }
-    let alone = |o: &Obstacles| CollisionWorld::new(o, None, vehicle, 0.0).pose_is_free(goal);
-    obstacles.polygons.retain(|p| alone(&Obstacles { polygons: vec![p.clone()], points: vec![] }));
-    obstacles.points.retain(|p| alone(&Obstacles { polygons: vec![], points: vec![*p] }));
-    obstacles
+    let alone = |polygons, points| {
+        let alone = Obstacles::new(polygons, vec![], points).unwrap();
+        CollisionWorld::new(&alone, None, vehicle, 0.0).pose_is_free(goal)
+    };
+    polygons.retain(|p| alone(vec![p.clone()], vec![]));
+    points.retain(|p| alone(vec![], vec![*p]));
+    Obstacles::new(polygons, vec![], points).unwrap()
 }
 
 #[test]

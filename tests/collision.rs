@@ -81,14 +81,14 @@ fn random_shape(rng: &mut impl Rng) -> (Obstacles, Box<dyn Shape>) {
             ParryPose::new(Vector::new(at.x, at.y), 0.0),
             parry2d_f64::shape::SharedShape::new(ball),
         )]);
-        return (Obstacles { polygons: vec![], points: vec![at] }, Box::new(moved));
+        return (Obstacles::new(vec![], vec![], vec![at]).unwrap(), Box::new(moved));
     }
     loop {
         let points: Vec<Vector> = draw(2 + choice).iter().map(|p| Vector::new(p.x, p.y)).collect();
         let Some(hull) = ConvexPolygon::from_convex_hull(&points) else { continue };
         let vertices = hull.points().iter().map(|p| Vec2::new(p.x, p.y)).collect();
         let Ok(polygon) = Polygon::new(vertices) else { continue };
-        return (Obstacles { polygons: vec![polygon], points: vec![] }, Box::new(hull));
+        return (Obstacles::new(vec![polygon], vec![], vec![]).unwrap(), Box::new(hull));
     }
 }
 
@@ -147,7 +147,7 @@ fn swept_check_agrees_with_dense_distances_on_200_000_motions() {
 fn a_car_inside_a_big_polygon_is_not_free() {
     let square = [(-50., -50.), (50., -50.), (50., 50.), (-50., 50.)];
     let polygon = Polygon::new(square.iter().map(|&(x, y)| Vec2::new(x, y)).collect()).unwrap();
-    let obstacles = Obstacles { polygons: vec![polygon], points: vec![] };
+    let obstacles = Obstacles::new(vec![polygon], vec![], vec![]).unwrap();
     let world = CollisionWorld::new(&obstacles, None, &Vehicle::default(), 0.0);
     assert!(!world.pose_is_free(Pose::default()));
     assert!(world.pose_is_free(Pose::new(60.0, 0.0, 0.0)));
@@ -157,7 +157,7 @@ fn a_car_inside_a_big_polygon_is_not_free() {
 fn nothing_tunnels_through_a_thin_wall() {
     let wall = [(3.0, -9.0), (3.001, -9.0), (3.001, 9.0), (3.0, 9.0)];
     let polygon = Polygon::new(wall.iter().map(|&(x, y)| Vec2::new(x, y)).collect()).unwrap();
-    let obstacles = Obstacles { polygons: vec![polygon], points: vec![] };
+    let obstacles = Obstacles::new(vec![polygon], vec![], vec![]).unwrap();
     let world = CollisionWorld::new(&obstacles, None, &Vehicle::default(), 0.0);
     let start = Pose::new(-5.0, 0.0, 0.0);
     assert!(world.pose_is_free(start));

@@ -487,7 +487,7 @@ fn models_of_another_vehicle_or_twice_the_same_are_refused() {
             "{text}"
         );
     }
-    let error = MlpSelector::load_all(&[&mlp, &mlp]).unwrap_err();
+    let error = MlpSelector::load_all(&mlp, &[&mlp]).unwrap_err();
     assert!(matches!(error.fault, Fault::Mismatch(_)), "{error}");
 }
 

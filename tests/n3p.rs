@@ -20,7 +20,7 @@ use std::path::Path;
 /// goal of `cell` without contact: written here from the definition.
 fn has_free_connection(grid: &Grid, cell: &Cell, vehicle: &Vehicle, pose: Pose) -> bool {
     let goal = grid.goal(cell.kind, vehicle);
-    let world = CollisionWorld::new(&grid.walls(cell), None, vehicle, 0.0);
+    let world = CollisionWorld::new(&grid.walls(cell).unwrap(), None, vehicle, 0.0);
     if !world.pose_is_free(pose) {
         return false;
     }

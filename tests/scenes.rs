@@ -48,7 +48,7 @@ fn reads_json_far_from_the_origin() {
     assert_eq!(scene.name, "points", "an empty name becomes the file's");
     assert_eq!(scene.start.x, 501200.25);
     assert_eq!(scene.points, [[501206.0, -201003.0]]);
-    assert_eq!(scene.geometry().points.len(), 1);
+    assert_eq!(scene.geometry().unwrap().points().len(), 1);
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn no_obstacles_is_a_scene() {
     fs::write(&path, json_with("obstacles", "[]")).unwrap();
     let scene = Scene::read(&path).unwrap();
     assert_eq!(scene.name, "empty lot");
-    assert!(scene.geometry().is_empty());
+    assert!(scene.geometry().unwrap().is_empty());
 }
 
 #[test]
@@ -253,7 +253,8 @@ fn real_scenes_read_with_free_starts_and_goals() {
     for folder in ["tpcap", "dlp"] {
         let Some(dir) = shared(folder) else { return };
         for scene in Scene::read_dir(&dir).unwrap() {
-            let polygons = scene.geometry().polygons;
+            let obstacles = scene.geometry().unwrap();
+            let polygons = obstacles.polygons();
             assert_eq!(polygons.len(), scene.obstacles.len());
             for pose in [scene.start, scene.goal] {
                 let car = scene.vehicle.footprint_at(pose);

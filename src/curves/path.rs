@@ -25,6 +25,9 @@ pub struct Sample {
 }
 
 impl Path {
+    /// The shortest distance between two samples, metres.
+    pub const LEAST_STEP: f64 = 1e-3;
+
     /// A path that begins at `start`; segments shorter than a nanometre are dropped and
     /// equal neighbours (same curvature and gear) are joined.
     pub fn new(start: Pose, segments: impl IntoIterator<Item = Segment>) -> Self {
@@ -85,8 +88,13 @@ impl Path {
         })
     }
 
-    /// Poses at most `step` metres apart, every segment border included.
+    /// Poses at most `step` metres and half a radian apart, every segment border included.
+    ///
+    /// A step below [`Path::LEAST_STEP`], or NaN, counts as that.
     pub fn sample(&self, step: f64) -> Vec<Sample> {
+        /// Radians: from much larger turns between two poses the arc cannot be told.
+        const TURN: f64 = 0.5;
+        let step = Self::LEAST_STEP.max(step);
         let mut out = Vec::new();
         let push = |out: &mut Vec<Sample>, p: Pose, s: Segment| {
             let pose = Pose::new(p.x, p.y, wrap_angle(p.heading));
@@ -94,7 +102,7 @@ impl Path {
         };
         let mut last = None;
         for (from, s) in self.legs() {
-            let n = (s.length.abs() / step).ceil().max(1.0) as usize;
+            let n = (s.length / step).abs().max((s.turn() / TURN).abs()).ceil().max(1.0) as usize;
             for i in 0..n {
                 push(&mut out, s.at(from, s.length * i as f64 / n as f64), s);
             }
@@ -163,6 +171,16 @@ mod tests {
         assert_eq!(poses[0].pose, p.start);
         assert!(poses.last().unwrap().pose.distance(p.end()) < 1e-12);
         assert!(poses.windows(2).all(|w| w[0].pose.distance(w[1].pose) <= 0.1 + 1e-12));
+    }
+
+    #[test]
+    fn samples_are_finitely_many_and_tell_the_arc() {
+        let circle = Path::new(Pose::default(), [Segment { curvature: 50.0, length: 0.3 }]);
+        let poses = circle.sample(f64::INFINITY);
+        assert_eq!(poses.len(), 31);
+        for step in [0.0, -1.0, f64::NAN, 1e-300] {
+            assert_eq!(circle.sample(step).len(), 301, "{step}");
+        }
     }
 
     #[test]

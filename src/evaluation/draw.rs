@@ -110,8 +110,7 @@ fn view(scene: &Scene, drawing: &Drawing) -> Aabb {
         Aabb::around(shown).inflated(PADDING)
     } else {
         let near = Aabb::around(shown.iter().copied()).inflated(PADDING_ALONE);
-        let obstacles = scene.geometry();
-        let all = Aabb::around(obstacles.edges().map(|(a, _)| a).chain(shown));
+        let all = Aabb::around(scene.outlines().flatten().chain(shown));
         let all = all.inflated(PADDING / 2.0);
         Aabb { min: near.min.sup(&all.min), max: near.max.inf(&all.max) }
     };
@@ -140,12 +139,12 @@ impl Map {
             self.polygon(lane.vertices(), LANE);
             self.polygon(spot.vertices(), SPOT);
         }
-        let obstacles = scene.geometry();
-        for p in obstacles.polygons.iter().filter(|p| p.aabb().intersects(&view)) {
-            self.polygon(p.vertices(), OBSTACLE);
-        }
-        for &p in obstacles.points.iter().filter(|&&p| view.contains(p)) {
-            self.dot(p, 2.2, r##"fill="#52606d""##);
+        let is_near = |o: &Vec<Vec2>| Aabb::around(o.iter().copied()).intersects(&view);
+        for outline in scene.outlines().filter(is_near) {
+            match outline[..] {
+                [point] => self.dot(point, 2.2, r##"fill="#52606d""##),
+                _ => self.polygon(&outline, OBSTACLE),
+            }
         }
         if let Some(path) = drawing.path {
             self.footprints(path, vehicle);

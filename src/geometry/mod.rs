@@ -6,6 +6,7 @@
 mod aabb;
 pub mod frame;
 mod polygon;
+mod polyline;
 pub mod pose;
 mod segment;
 
@@ -13,6 +14,7 @@ pub use aabb::Aabb;
 pub use frame::Frame;
 pub(crate) use polygon::is_within;
 pub use polygon::{Polygon, PolygonError};
+pub use polyline::Polyline;
 pub use pose::{Pose, signed_angle, wrap_angle};
 pub use segment::{distance_to_segment, segment_in_box};
 

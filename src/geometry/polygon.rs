@@ -8,12 +8,17 @@ pub struct Polygon {
     vertices: Vec<Vec2>,
 }
 
-/// Why a list of vertices is not a polygon.
+/// Why a list of vertices is not a polygon (or a polyline).
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PolygonError {
-    /// Fewer than three vertices.
-    #[error("has {0} vertices; a polygon needs at least 3")]
-    TooFewVertices(usize),
+    /// Fewer than three vertices (two of a polyline).
+    #[error("has {vertices} vertices; at least {needed} needed")]
+    TooFewVertices {
+        /// How many there are.
+        vertices: usize,
+        /// How many there must be.
+        needed: usize,
+    },
     /// A coordinate is NaN or infinite.
     #[error("vertex {0} is not a finite point")]
     NotFinite(usize),
@@ -26,7 +31,7 @@ impl Polygon {
             return Err(PolygonError::NotFinite(i));
         }
         if vertices.len() < 3 {
-            return Err(PolygonError::TooFewVertices(vertices.len()));
+            return Err(PolygonError::TooFewVertices { vertices: vertices.len(), needed: 3 });
         }
         Ok(Self { vertices })
     }

@@ -34,6 +34,9 @@ impl AnalyticTail {
     }
 }
 
+/// Multiples of the entry step that settings within their ranges can ask for.
+const MOST_STRAIGHTS: u32 = 1001;
+
 /// A goal pose, and the poses from which the rest of the way into it is known.
 #[derive(Clone, Debug)]
 pub(crate) struct GoalSet {
@@ -111,7 +114,8 @@ impl GoalSet {
     }
 
     /// Adds every free entry straight into the goal of `problem` whose length is `offset`
-    /// plus a multiple of `step`, more than 0 and at most `longest`, all in metres.
+    /// plus a multiple of `step`, more than 0 and at most `longest`, all in metres. At most
+    /// [`MOST_STRAIGHTS`] multiples are tried, whatever the settings.
     pub fn add_straights(
         &mut self,
         problem: &Problem,
@@ -120,7 +124,8 @@ impl GoalSet {
         step: f64,
         longest: f64,
     ) {
-        let lengths = (0..).map(|i| offset + f64::from(i) * step).filter(|l| *l > 0.0);
+        let lengths =
+            (0..MOST_STRAIGHTS).map(|i| offset + f64::from(i) * step).filter(|l| *l > 0.0);
         for gear in problem.entry_gears() {
             for length in lengths.clone().take_while(|l| *l <= longest + 1e-9) {
                 let entry = Segment::straight(gear.sign() * length);

@@ -169,12 +169,16 @@ impl HybridAStarConfig {
 
     /// Runs `search` on each lattice, coarse to fine, until it finds something or the goal
     /// turns out to be enclosed. `expansions` is reduced by what was spent: finer lattices
-    /// are left their share even when a coarse one goes on and on.
+    /// are left their share even when a coarse one goes on and on. Settings out of their ranges
+    /// fail before anything is sized by them.
     pub(super) fn coarse_to_fine<T>(
         &self,
         expansions: &mut usize,
         mut search: impl FnMut(&Resolution, &mut usize) -> Result<T, NoPath>,
     ) -> Result<T, NoPath> {
+        if self.validate().is_err() {
+            return Err(NoPath::Failed("settings out of range"));
+        }
         let mut result = Err(NoPath::BudgetSpent);
         for (i, resolution) in self.resolutions.iter().enumerate() {
             let last = i + 1 == self.resolutions.len();

@@ -2,13 +2,23 @@
 //!
 //! Shortest distances to the goal over a grid, with the largest disc around the rear axle
 //! that the footprint always covers. Computed lazily: the wave from the goal advances only
-//! as far as somebody asks (Dial's buckets, since steps cost 10 or 14 units).
+//! as far as somebody asks (Dial's buckets, since steps cost 10 or 14 units), and the grid is
+//! stored in pages allocated where the wave goes.
+//!
+//! A cell is blocked only where the disc collides from every point of it, so that an infinite
+//! distance is a proof: no motion within the domain leads there.
+
+use std::f64::consts::FRAC_1_SQRT_2;
 
 use crate::geometry::{Aabb, Pose, Vec2, distance_to_segment};
-use crate::world::Obstacles;
+use crate::vehicle::Vehicle;
+use crate::world::collision::CollisionWorld;
 
-const UNKNOWN: u32 = u32::MAX;
-const BLOCKED: u32 = u32::MAX - 1;
+/// Not reached yet.
+const UNKNOWN: u32 = u32::MAX >> 1;
+const BLOCKED: u32 = UNKNOWN - 1;
+/// Set in the costs that are final.
+const SETTLED: u32 = 1 << 31;
 /// Costs are tenths of a cell: straight 10, diagonal 14.
 const STEPS: [(i32, i32, u32); 8] = [
     (1, 0, 10),
@@ -21,15 +31,26 @@ const STEPS: [(i32, i32, u32); 8] = [
     (-1, -1, 14),
 ];
 const BUCKETS: usize = 16;
+/// Cells per side of a page.
+const PAGE: usize = 64;
+/// No page yet.
+const NONE: u32 = u32::MAX;
+/// The wave goes no further than so many pages (64 MB): beyond, distances are lower bounds.
+const MOST_PAGES: usize = 1 << 12;
 
 /// Grid distances to one goal. Buffers are reused from call to call.
 #[derive(Debug, Default)]
 pub(super) struct CostToGo {
     origin: Vec2,
     cell: f64,
+    /// A cell is blocked by an edge nearer than this to its centre, metres.
+    reach: f64,
     size: (i32, i32),
+    pages_x: usize,
+    /// Page index per page position; `NONE` where the wave has not been.
+    page_of: Vec<u32>,
+    /// Costs of all pages, `PAGE × PAGE` each.
     costs: Vec<u32>,
-    settled: Vec<bool>,
     buckets: [Vec<(i32, i32)>; BUCKETS],
     /// The cost whose bucket is being emptied.
     front: u32,
@@ -38,65 +59,79 @@ pub(super) struct CostToGo {
 }
 
 impl CostToGo {
-    /// Prepares distances to `goal` within `domain` for a disc of `radius` metres.
-    pub fn reset(
-        &mut self,
-        domain: &Aabb,
-        cell: f64,
-        radius: f64,
-        obstacles: &Obstacles,
-        goal: Pose,
-    ) {
+    /// Side of a cell for this vehicle, metres: at most `wanted`, and so small that cells of half
+    /// the disc's depth within an obstacle are blocked; but no less than a fortieth of the
+    /// vehicle, where the disc is tiny and little can be said.
+    pub fn cell(wanted: f64, vehicle: &Vehicle) -> f64 {
+        let fine = inscribed_radius(vehicle) * FRAC_1_SQRT_2;
+        wanted.min(fine.max(vehicle.length / 40.0))
+    }
+
+    /// Prepares distances to `goal` within `domain` for `vehicle`, in cells of
+    /// [`CostToGo::cell`].
+    pub fn reset(&mut self, domain: &Aabb, wanted: f64, vehicle: &Vehicle, goal: Pose) {
         let extent = domain.max - domain.min;
+        let cell = Self::cell(wanted, vehicle);
         self.origin = domain.min;
         self.cell = cell;
+        // The disc collides from every point of a cell.
+        self.reach = inscribed_radius(vehicle) - cell * FRAC_1_SQRT_2;
         self.size = ((extent.x / cell).ceil() as i32 + 1, (extent.y / cell).ceil() as i32 + 1);
-        let n = (self.size.0 * self.size.1) as usize;
+        let pages = |cells: i32| (cells.max(0) as usize).div_ceil(PAGE);
+        self.pages_x = pages(self.size.0);
+        self.page_of.clear();
+        self.page_of.resize(self.pages_x * pages(self.size.1), NONE);
         self.costs.clear();
-        self.costs.resize(n, UNKNOWN);
-        self.settled.clear();
-        self.settled.resize(n, false);
         self.buckets.iter_mut().for_each(Vec::clear);
         self.front = 0;
         self.waiting = 0;
-        // A cell is blocked only if the disc collides from every point of it.
-        self.block(obstacles, radius - cell * std::f64::consts::FRAC_1_SQRT_2);
         if let Some(c) = self.cell_of(goal.position()) {
-            let i = self.index(c);
-            self.costs[i] = 0;
             self.buckets[0].push(c);
             self.waiting = 1;
         }
     }
 
-    /// Metres from `p` to the goal; infinite where the goal cannot be reached.
-    pub fn distance(&mut self, p: Vec2) -> f64 {
+    /// Metres from `p` to the goal; infinite where nothing leads to it within the domain.
+    /// `world` has the obstacles, the same from one reset to the next.
+    pub fn distance(&mut self, p: Vec2, world: &CollisionWorld) -> f64 {
         let Some(c) = self.cell_of(p) else { return f64::INFINITY };
-        let i = self.index(c);
-        while !self.settled[i] && self.waiting > 0 {
-            self.advance();
+        let i = self.index(c, world);
+        while self.costs[i] & SETTLED == 0 && self.waiting > 0 {
+            if self.costs.len() > MOST_PAGES * PAGE * PAGE {
+                return self.metres(self.front);
+            }
+            self.advance(world);
         }
-        if self.settled[i] { f64::from(self.costs[i]) * self.cell / 10.0 } else { f64::INFINITY }
+        match self.costs[i] {
+            cost if cost & SETTLED != 0 => self.metres(cost & !SETTLED),
+            _ => f64::INFINITY,
+        }
+    }
+
+    fn metres(&self, cost: u32) -> f64 {
+        f64::from(cost) * self.cell / 10.0
     }
 
     /// Empties the bucket of the front cost.
-    fn advance(&mut self) {
+    fn advance(&mut self, world: &CollisionWorld) {
         let slot = self.front as usize % BUCKETS;
         while let Some(c) = self.buckets[slot].pop() {
             self.waiting -= 1;
-            let i = self.index(c);
-            if self.settled[i] {
+            let i = self.index(c, world);
+            if self.costs[i] & SETTLED != 0 {
                 continue;
             }
-            self.settled[i] = true;
+            self.costs[i] = self.front | SETTLED;
             for (dx, dy, step) in STEPS {
                 let next = (c.0 + dx, c.1 + dy);
                 if next.0 < 0 || next.1 < 0 || next.0 >= self.size.0 || next.1 >= self.size.1 {
                     continue;
                 }
-                let j = self.index(next);
+                let j = self.index(next, world);
                 let cost = self.front + step;
-                if self.costs[j] == UNKNOWN || (self.costs[j] != BLOCKED && cost < self.costs[j]) {
+                let known = self.costs[j];
+                // Settled costs are larger than any other number.
+                if known == UNKNOWN || cost < known && known < BLOCKED {
                     self.costs[j] = cost;
                     self.buckets[cost as usize % BUCKETS].push(next);
                     self.waiting += 1;
@@ -104,28 +139,6 @@ impl CostToGo {
             }
         }
         self.front += 1;
-    }
-
-    fn block(&mut self, obstacles: &Obstacles, radius: f64) {
-        let radius = radius.max(self.cell / 2.0);
-        for (a, b) in obstacles.edges() {
-            let near = Aabb::around([a, b]).inflated(radius);
-            let low = (near.min - self.origin) / self.cell;
-            let high = (near.max - self.origin) / self.cell;
-            let range = |lo: f64, hi: f64, n: i32| {
-                (lo.ceil().max(0.0) as i32)..=(hi.floor().min(f64::from(n - 1)) as i32)
-            };
-            for y in range(low.y, high.y, self.size.1) {
-                for x in range(low.x, high.x, self.size.0) {
-                    let center =
-                        self.origin + Vec2::new(f64::from(x) * self.cell, f64::from(y) * self.cell);
-                    if distance_to_segment(center, a, b) < radius {
-                        let i = self.index((x, y));
-                        self.costs[i] = BLOCKED;
-                    }
-                }
-            }
-        }
     }
 
     fn cell_of(&self, p: Vec2) -> Option<(i32, i32)> {
@@ -136,46 +149,154 @@ impl CostToGo {
         inside.then_some((x as i32, y as i32))
     }
 
-    fn index(&self, (x, y): (i32, i32)) -> usize {
-        (y * self.size.0 + x) as usize
+    /// Where the cost of a cell is kept. Makes its page if need be.
+    #[inline]
+    fn index(&mut self, (x, y): (i32, i32), world: &CollisionWorld) -> usize {
+        let (x, y) = (x as usize, y as usize);
+        let (page_x, page_y) = (x / PAGE, y / PAGE);
+        let mut page = self.page_of[page_y * self.pages_x + page_x];
+        if page == NONE {
+            page = self.make_page(page_x, page_y, world);
+        }
+        page as usize * PAGE * PAGE + y % PAGE * PAGE + x % PAGE
     }
+
+    #[cold]
+    fn make_page(&mut self, page_x: usize, page_y: usize, world: &CollisionWorld) -> u32 {
+        let first = self.costs.len();
+        let page = (first / (PAGE * PAGE)) as u32;
+        self.page_of[page_y * self.pages_x + page_x] = page;
+        self.costs.resize(first + PAGE * PAGE, UNKNOWN);
+        if self.reach <= 0.0 {
+            return page;
+        }
+        let center = |cell: usize| cell as f64 * self.cell;
+        let corner = self.origin + Vec2::new(center(page_x * PAGE), center(page_y * PAGE));
+        let side = center(PAGE - 1);
+        let centers = Aabb { min: corner, max: corner + Vec2::new(side, side) };
+        let (cell, reach, costs) = (self.cell, self.reach, &mut self.costs[first..]);
+        world.edges_near(&centers.inflated(reach), |a, b| {
+            let near = Aabb::around([a, b]).inflated(reach);
+            let low = (near.min - corner) / cell;
+            let high = (near.max - corner) / cell;
+            let range = |lo: f64, hi: f64| {
+                (lo.ceil().max(0.0) as usize)..(hi.floor() + 1.0).clamp(0.0, PAGE as f64) as usize
+            };
+            for y in range(low.y, high.y) {
+                for x in range(low.x, high.x) {
+                    let center = corner + Vec2::new(x as f64 * cell, y as f64 * cell);
+                    if distance_to_segment(center, a, b) < reach {
+                        costs[y * PAGE + x] = BLOCKED;
+                    }
+                }
+            }
+        });
+        page
+    }
+}
+
+/// The largest disc around the rear axle inside every footprint, metres.
+fn inscribed_radius(vehicle: &Vehicle) -> f64 {
+    (vehicle.width / 2.0).min(vehicle.rear_overhang).min(vehicle.front_extent())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::Polygon;
+    use crate::world::Obstacles;
+
+    /// A world of boxes `[x_min, y_min, x_max, y_max]`.
+    fn world(boxes: &[[f64; 4]], vehicle: &Vehicle) -> CollisionWorld {
+        let solid =
+            |&[a, b, c, d]: &[f64; 4]| Polygon::rectangle(Pose::default(), Aabb::new(a, b, c, d));
+        let obstacles = Obstacles::new(boxes.iter().map(solid).collect(), vec![], vec![]);
+        CollisionWorld::new(&obstacles.unwrap(), None, vehicle, 0.0)
+    }
 
     #[test]
     fn goes_around_a_wall() {
-        let wall = Polygon::rectangle(Pose::default(), Aabb::new(4.8, -10.0, 5.2, 5.0));
-        let obstacles = Obstacles { polygons: vec![wall], points: vec![] };
+        let vehicle = Vehicle::default();
         let domain = Aabb::new(-10.0, -10.0, 20.0, 20.0);
         let mut c = CostToGo::default();
         let goal = Pose::new(10.0, 0.0, 0.0);
-        c.reset(&domain, 0.5, 0.9, &Obstacles::default(), goal);
-        assert!((c.distance(Vec2::new(0.0, 0.0)) - 10.0).abs() < 0.5);
-        c.reset(&domain, 0.5, 0.9, &obstacles, goal);
-        let around = c.distance(Vec2::new(0.0, 0.0));
+        c.reset(&domain, 0.5, &vehicle, goal);
+        let open = world(&[], &vehicle);
+        assert!((c.distance(Vec2::new(0.0, 0.0), &open) - 10.0).abs() < 0.5);
+        c.reset(&domain, 0.5, &vehicle, goal);
+        let wall = world(&[[4.8, -10.0, 5.2, 5.0]], &vehicle);
+        let around = c.distance(Vec2::new(0.0, 0.0), &wall);
         assert!((14.0..17.0).contains(&around), "{around}");
     }
 
     #[test]
     fn an_enclosed_goal_is_infinitely_far() {
+        let vehicle = Vehicle::default();
         let ring = [
-            (-3.0, -3.0, 3.0, -2.8),
-            (-3.0, 2.8, 3.0, 3.0),
-            (-3.0, -3.0, -2.8, 3.0),
-            (2.8, -3.0, 3.0, 3.0),
+            [-3.0, -3.0, 3.0, -2.8],
+            [-3.0, 2.8, 3.0, 3.0],
+            [-3.0, -3.0, -2.8, 3.0],
+            [2.8, -3.0, 3.0, 3.0],
         ];
-        let polygons = ring
-            .map(|(a, b, c, d)| Polygon::rectangle(Pose::default(), Aabb::new(a, b, c, d)))
-            .to_vec();
+        let world = world(&ring, &vehicle);
         let mut c = CostToGo::default();
-        let obstacles = Obstacles { polygons, points: vec![] };
         let domain = Aabb::new(-10.0, -10.0, 10.0, 10.0);
-        c.reset(&domain, 0.5, 0.9, &obstacles, Pose::default());
-        assert_eq!(c.distance(Vec2::new(8.0, 8.0)), f64::INFINITY);
-        assert!(c.distance(Vec2::new(0.5, 0.5)) < 1.0);
+        c.reset(&domain, 0.5, &vehicle, Pose::default());
+        assert_eq!(c.distance(Vec2::new(8.0, 8.0), &world), f64::INFINITY);
+        assert!(c.distance(Vec2::new(0.5, 0.5), &world) < 1.0);
+    }
+
+    /// A corridor just wider than the vehicle, at any offset from the grid, is never a wall.
+    #[test]
+    fn what_the_vehicle_passes_is_never_blocked() {
+        let car = Vehicle::default();
+        let robot = |length, width, rear_overhang| Vehicle {
+            length,
+            width,
+            rear_overhang,
+            wheelbase: 0.5 * length,
+            ..car
+        };
+        let vehicles = [
+            car,
+            robot(0.4, 0.2, 0.1),
+            robot(0.4, 0.2, 0.01),
+            robot(4.2, 1.8, 0.15),
+            robot(4.2, 1.8, 0.0),
+            robot(12.0, 2.5, 3.0),
+        ];
+        for vehicle in vehicles {
+            let (long, gap) = (3.0 * vehicle.length, vehicle.width / 2.0 + 0.01);
+            for offset in 0..20 {
+                let y = f64::from(offset) * 0.05 * vehicle.width;
+                let walls = [
+                    [0.0, y + gap, long, y + gap + 1.0],
+                    [0.0, y - gap - 1.0, long, y - gap],
+                    [long / 2.0, y - 50.0, long / 2.0 + 0.1, y - gap],
+                    [long / 2.0, y + gap, long / 2.0 + 0.1, y + 50.0],
+                ];
+                let world = world(&walls, &vehicle);
+                let domain = Aabb::new(-long, -long, 2.0 * long, long);
+                let mut c = CostToGo::default();
+                c.reset(&domain, 0.5, &vehicle, Pose::new(-long / 2.0, y, 0.0));
+                let through = c.distance(Vec2::new(1.5 * long, y), &world);
+                assert!(through < 2.3 * long, "{vehicle:?} {offset}: {through}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_huge_domain_takes_little_memory_and_no_wrong_proof() {
+        let vehicle = Vehicle::default();
+        let open = world(&[], &vehicle);
+        let mut c = CostToGo::default();
+        // 46,000 cells a side: their number is beyond 32 bits.
+        let domain = Aabb::new(0.0, 0.0, 2300.0, 2300.0);
+        c.reset(&domain, 0.05, &vehicle, Pose::new(1.0, 1.0, 0.0));
+        let near = c.distance(Vec2::new(30.0, 1.0), &open);
+        assert!((near - 29.0).abs() < 0.1, "{near}");
+        let far = c.distance(Vec2::new(2299.0, 2299.0), &open);
+        assert!(far.is_finite() && far > 100.0 && far < 3300.0, "{far}");
+        assert!(4 * c.costs.len() < 80 << 20, "{}", c.costs.len());
     }
 }

@@ -12,7 +12,6 @@
 
 use crate::curves::{Path, Segment};
 use crate::geometry::Pose;
-use crate::vehicle::Vehicle;
 
 use super::analytic::{AnalyticExpansion, AnalyticTail};
 pub(crate) use super::analytic::{Connection, Entry, GoalSet};
@@ -264,9 +263,4 @@ fn manoeuvre_begin(path: &Path) -> usize {
     let cusp = segments.windows(2).position(|w| w[0].gear() != w[1].gear()).map(|i| i + 1);
     let last_turn = || segments.iter().rposition(|s| s.curvature != 0.0);
     cusp.or_else(last_turn).unwrap_or(0)
-}
-
-/// The largest disc around the rear axle inside every footprint, metres.
-pub(super) fn inscribed_radius(vehicle: &Vehicle) -> f64 {
-    (vehicle.width / 2.0).min(vehicle.rear_overhang).min(vehicle.front_extent())
 }

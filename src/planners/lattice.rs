@@ -1,7 +1,7 @@
 //! Which lattice states a search has reached, and how cheaply.
 //!
-//! The lattice (x, y, heading) is stored in tiles allocated where the search goes, so that
-//! neither a large lot nor a reset costs more than the states really visited.
+//! The lattice (x, y, heading) is stored in tiles, and the table of tiles in pages, both allocated
+//! where the search goes: neither a large lot nor a reset costs more than the states visited.
 
 use std::f64::consts::TAU;
 
@@ -9,6 +9,8 @@ use crate::geometry::{Aabb, Pose};
 
 /// Cells per side of a tile.
 const TILE: usize = 8;
+/// Tiles per side of a page.
+const PAGE: usize = 64;
 
 /// No tile, or no cost yet.
 const NONE: u32 = u32::MAX;
@@ -20,8 +22,10 @@ pub(super) struct Lattice {
     inverse_cell: f64,
     headings: usize,
     size: (usize, usize),
-    tiles_x: usize,
-    /// Tile index per tile position; `NONE` where the search has not been.
+    pages_x: usize,
+    /// Page index per page position; `NONE` where the search has not been.
+    page_of: Vec<u32>,
+    /// Tile index per tile position of all pages, `PAGE × PAGE` each.
     tile_of: Vec<u32>,
     /// Costs of all tiles, `TILE × TILE × headings` each.
     costs: Vec<f32>,
@@ -41,9 +45,10 @@ impl Lattice {
         self.inverse_cell = 1.0 / cell;
         self.headings = headings;
         self.size = (count(extent.x), count(extent.y));
-        self.tiles_x = self.size.0.div_ceil(TILE);
+        self.pages_x = self.size.0.div_ceil(PAGE * TILE);
+        self.page_of.clear();
+        self.page_of.resize(self.pages_x * self.size.1.div_ceil(PAGE * TILE), NONE);
         self.tile_of.clear();
-        self.tile_of.resize(self.tiles_x * self.size.1.div_ceil(TILE), NONE);
         self.costs.clear();
     }
 
@@ -63,7 +68,14 @@ impl Lattice {
         debug_assert!(pose.heading.abs() <= TAU);
         let turn = pose.heading / TAU + 1.0;
         let heading = (turn * self.headings as f64 + 0.5) as usize % self.headings;
-        let tile = &mut self.tile_of[y / TILE * self.tiles_x + x / TILE];
+        let (tile_x, tile_y) = (x / TILE, y / TILE);
+        let page = &mut self.page_of[tile_y / PAGE * self.pages_x + tile_x / PAGE];
+        if *page == NONE {
+            *page = (self.tile_of.len() / (PAGE * PAGE)) as u32;
+            self.tile_of.resize(self.tile_of.len() + PAGE * PAGE, NONE);
+        }
+        let in_page = tile_y % PAGE * PAGE + tile_x % PAGE;
+        let tile = &mut self.tile_of[*page as usize * PAGE * PAGE + in_page];
         let states = TILE * TILE * self.headings;
         if *tile == NONE {
             *tile = (self.costs.len() / states) as u32;
@@ -103,5 +115,16 @@ mod tests {
         l.reset(&Aabb::new(-10.0, -10.0, 10.0, 10.0), 0.5, 72);
         let again = at(&mut l, 0.1, 0.1, 0.0).unwrap();
         assert_eq!(l.cost(again), f32::INFINITY);
+    }
+
+    #[test]
+    fn a_large_domain_takes_the_memory_of_the_states_visited() {
+        let mut l = Lattice::default();
+        l.reset(&Aabb::new(0.0, 0.0, 1e4, 1e4), 0.02, 720);
+        let corners = [(0.0, 0.0), (9999.9, 0.0), (0.0, 9999.9), (9999.9, 9999.9)];
+        let states = corners.map(|(x, y)| l.state(Pose::new(x, y, 0.0)).unwrap());
+        assert!(states.windows(2).all(|w| w[0] != w[1]));
+        let bytes = 4 * (l.page_of.len() + l.tile_of.len() + l.costs.len());
+        assert!(bytes < 8 << 20, "{bytes}");
     }
 }

@@ -4,8 +4,9 @@ use crate::geometry::{Frame, Pose, Vec2};
 use crate::vehicle::{Gear, Vehicle};
 use crate::world::cell::{Cell, Grid};
 use crate::world::collision::CollisionWorld;
+use crate::world::scene::InvalidField;
 use crate::world::spot::{self, Precision, SpotGuess};
-use crate::world::{Obstacles, ParkingType, Scene};
+use crate::world::{ObstacleError, Obstacles, ParkingType, Scene};
 
 /// What planners see: everything in the planning frame (the spot frame where the scene
 /// has a spot, else the goal's own frame), so that results do not depend on where in the
@@ -31,8 +32,17 @@ pub struct Problem {
 }
 
 /// A problem that has no solution by its own data.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProblemError {
+    /// A value that no scene can have.
+    #[error(transparent)]
+    Invalid(#[from] InvalidField),
+    /// An obstacle that is none.
+    #[error(transparent)]
+    Obstacle(#[from] ObstacleError),
+    /// A margin that no plan can keep.
+    #[error("margin is {0} m; expected a number from 0 to {max}", max = Problem::MAX_MARGIN)]
+    Margin(f64),
     /// The start footprint touches an obstacle or its axle is out of bounds.
     #[error("start: the footprint at {0:?} touches an obstacle or leaves the bounds")]
     StartInCollision([f64; 3]),
@@ -49,7 +59,7 @@ impl Problem {
     /// The largest margin that can be asked for, metres.
     pub const MAX_MARGIN: f64 = 1.0;
 
-    /// The problem of a validated scene, with the usual [`Problem::MARGIN`].
+    /// The problem of a scene, with the usual [`Problem::MARGIN`].
     pub fn new(scene: &Scene) -> Result<Problem, ProblemError> {
         Self::with_margin(scene, Self::MARGIN)
     }
@@ -60,7 +70,7 @@ impl Problem {
         Self::seen(scene, Self::MARGIN, Precision::Given)
     }
 
-    /// The problem of a validated scene whose plans keep `margin` metres from obstacles, and
+    /// The problem of a scene whose plans keep `margin` metres from obstacles, and
     /// never less than [`Problem::MARGIN`], where start and goal allow it.
     ///
     /// A plan contains its start and its goal. Where one of them is nearer to an obstacle, less
@@ -68,17 +78,16 @@ impl Problem {
     /// where that is less than one, and 0 where they do not allow that either. The field `margin`
     /// says what it came to. Whole centimetres, because planners prepare themselves for every
     /// footprint they meet.
-    ///
-    /// # Panics
-    ///
-    /// If `margin` is not from 0 to [`Problem::MAX_MARGIN`].
     pub fn with_margin(scene: &Scene, margin: f64) -> Result<Problem, ProblemError> {
-        assert!((0.0..=Self::MAX_MARGIN).contains(&margin), "a margin of {margin} m");
+        if !(0.0..=Self::MAX_MARGIN).contains(&margin) {
+            return Err(ProblemError::Margin(margin));
+        }
         Self::seen(scene, margin, Precision::Rounded)
     }
 
     fn seen(scene: &Scene, margin: f64, precision: Precision) -> Result<Problem, ProblemError> {
-        let SpotGuess { frame, kind, obstacles } = spot::guess(scene, precision);
+        scene.check_numbers()?;
+        let SpotGuess { frame, kind, obstacles } = spot::guess(scene, precision)?;
         let bounds = scene.bounds.map(|b| spot::bounds_in_frame(b, &frame, precision));
         let start = precision.pose(frame.local_from_world(scene.start));
         let goal = match precision {
@@ -96,6 +105,7 @@ impl Problem {
                 ProblemError::GoalInCollision(_) => {
                     ProblemError::GoalInCollision(scene.goal.into())
                 }
+                other => other,
             },
         )
     }
@@ -108,7 +118,7 @@ impl Problem {
         start: Pose,
     ) -> Result<Problem, ProblemError> {
         let goal = grid.goal(cell.kind, &vehicle);
-        let (walls, ends) = (grid.walls(cell), [start, goal]);
+        let (walls, ends) = (grid.walls(cell)?, [start, goal]);
         Self::checked(vehicle, Frame::WORLD, Some(cell.kind), ends, walls, None, Self::MARGIN)
     }
 

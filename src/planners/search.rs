@@ -14,7 +14,6 @@ use super::analytic::GoalSet;
 use super::config::{HybridAStarConfig, Resolution};
 use super::cost::{CostModel, DriveState};
 use super::cost_to_go::CostToGo;
-use super::hybrid_astar::inscribed_radius;
 use super::lattice::Lattice;
 use super::multi_heuristic::Guides;
 use super::nonholonomic::NonHolonomic;
@@ -113,17 +112,16 @@ impl Search {
         self.since_curve = 0;
         self.lattice.reset(&domain, resolution.cell, resolution.headings);
         self.nonholonomic.reset(vehicle, &config.cost);
-        let radius = inscribed_radius(vehicle);
-        let cell = config.cost_to_go_cell;
-        self.cost_to_go.reset(&domain, cell, radius, &problem.obstacles, start);
+        self.cost_to_go.reset(&domain, config.cost_to_go_cell, vehicle, start);
         self.prepare_primitives(resolution, vehicle, problem.collision.footprint());
-        self.enclosed = !self.cost_to_go.distance(goal.pose.position()).is_finite();
+        let distance = self.cost_to_go.distance(goal.pose.position(), &problem.collision);
+        self.enclosed = !distance.is_finite();
         if self.enclosed {
             return;
         }
         for (i, entry) in goal.entries().iter().enumerate() {
             let pose = Pose { heading: wrap_angle(entry.pose.heading), ..entry.pose };
-            let estimate = self.estimate_to_come(pose, vehicle, &config.cost);
+            let estimate = self.estimate_to_come(pose, problem, &config.cost);
             let to_come = estimate.cost();
             let Some(state) = self.lattice.state(pose) else { continue };
             let cost = entry.cost() as f32;
@@ -229,7 +227,7 @@ impl Search {
             {
                 continue;
             }
-            let estimate = self.estimate_to_come(pose, &problem.vehicle, &config.cost);
+            let estimate = self.estimate_to_come(pose, problem, &config.cost);
             let to_come = estimate.cost();
             if !to_come.is_finite() {
                 continue;
@@ -254,13 +252,13 @@ impl Search {
     }
 
     /// Estimates the cost from the start to `pose`.
-    fn estimate_to_come(&mut self, pose: Pose, vehicle: &Vehicle, model: &CostModel) -> Estimate {
+    fn estimate_to_come(&mut self, pose: Pose, problem: &Problem, model: &CostModel) -> Estimate {
         let per_metre = model.forward.min(model.backward);
-        let grid = self.cost_to_go.distance(pose.position()) * per_metre;
+        let grid = self.cost_to_go.distance(pose.position(), &problem.collision) * per_metre;
         if !grid.is_finite() {
             return Estimate { grid: f32::INFINITY, curve: 0.0 };
         }
-        let curve = self.nonholonomic.cost(self.start.relative(pose), vehicle, model);
+        let curve = self.nonholonomic.cost(self.start.relative(pose), &problem.vehicle, model);
         Estimate { grid: grid as f32, curve: curve as f32 }
     }
 

@@ -27,6 +27,8 @@ use super::{Features, PoseSelector};
 /// Expansions that the paper's two legs may spend, so that a pose just beside the feasible
 /// ones does not use up what the full search needs.
 const LEG_EXPANSIONS: usize = 5_000;
+/// Libraries kept prepared: those of the parking types of two vehicles, or of one with two margins.
+const LIBRARIES: usize = 6;
 /// Known manoeuvres, free in the scene, that `n3p` tries to join before it asks for the curve
 /// straight to the goal, and then once more for something cheaper: most plans take the first.
 const FIRST_TRIES: usize = 16;
@@ -80,7 +82,8 @@ pub struct GuidedPlanner {
     selector: Arc<dyn PoseSelector>,
     hars: HybridAStar,
     poses: Vec<Pose>,
-    /// The selector's manoeuvres, prepared for the parking types and footprints met so far.
+    /// The selector's manoeuvres, prepared for the parking types and footprints met last, the
+    /// latest first.
     libraries: Vec<(ParkingType, Library)>,
     library_search: LibrarySearch,
     verdicts: Verdicts,
@@ -132,15 +135,14 @@ impl GuidedPlanner {
         }
     }
 
-    /// The plan by a manoeuvre of the library with this number. Where the first free ones cannot be
+    /// The plan by a manoeuvre of the library prepared last. Where the first free ones cannot be
     /// joined, one curve straight to the goal is asked for, too, and the cheaper plan taken.
-    fn look_up(&mut self, library: usize, problem: &Problem) -> Attempt {
+    fn look_up(&mut self, problem: &Problem) -> Attempt {
         let Self { libraries, library_search, verdicts, hars, .. } = self;
         let cost = hars.config().cost;
         verdicts.clear();
         let any = f64::INFINITY;
-        let mut look_up =
-            library_search.look_up(&libraries[library].1, verdicts, problem, &cost, any);
+        let mut look_up = library_search.look_up(&libraries[0].1, verdicts, problem, &cost, any);
         let plan = look_up.next(any, FIRST_TRIES);
         let mut direct = None;
         let plan = plan.or_else(|| {
@@ -158,18 +160,23 @@ impl GuidedPlanner {
         Some((path, Guidance { preparatory, route }))
     }
 
-    /// The number of the library for `problem`, prepared if need be; `None` where nothing is known.
-    fn library(&mut self, problem: &Problem) -> Option<usize> {
-        let kind = problem.kind?;
+    /// Puts the library for `problem` first, prepared if need be, and says whether it knows
+    /// anything.
+    fn prepare_library(&mut self, problem: &Problem) -> bool {
+        let Some(kind) = problem.kind else { return false };
         let fits = |(k, l): &(ParkingType, Library)| *k == kind && l.fits(problem);
-        let at = self.libraries.iter().position(fits).unwrap_or_else(|| {
-            let (vehicle, footprint) = (&problem.vehicle, *problem.collision.footprint());
-            let manoeuvres = self.selector.manoeuvres(kind, vehicle);
-            let library = Library::new(&manoeuvres, vehicle, footprint, &self.hars.config().cost);
-            self.libraries.push((kind, library));
-            self.libraries.len() - 1
-        });
-        (!self.libraries[at].1.is_empty()).then_some(at)
+        match self.libraries.iter().position(fits) {
+            Some(at) => self.libraries[..=at].rotate_right(1),
+            None => {
+                let (vehicle, footprint) = (&problem.vehicle, *problem.collision.footprint());
+                let manoeuvres = self.selector.manoeuvres(kind, vehicle);
+                let cost = &self.hars.config().cost;
+                let library = Library::new(&manoeuvres, vehicle, footprint, cost);
+                self.libraries.truncate(LIBRARIES - 1);
+                self.libraries.insert(0, (kind, library));
+            }
+        }
+        !self.libraries[0].1.is_empty()
     }
 
     /// The cells found around the spot, the largest first.
@@ -215,10 +222,8 @@ impl GuidedPlanner {
         config: RankedConfig,
         left: &mut usize,
     ) -> Result<(Path, Guidance), NoPath> {
-        let library = if config.library { self.library(problem) } else { None };
-        if let Some(number) = library
-            && let Some(planned) = self.look_up(number, problem)
-        {
+        let has_library = config.library && self.prepare_library(problem);
+        if has_library && let Some(planned) = self.look_up(problem) {
             return Ok(planned);
         }
         let mut goal = self.hars.goal_set(problem);
@@ -238,8 +243,8 @@ impl GuidedPlanner {
             route,
         };
         // Who looked plans up has tried the curve straight to the goal.
-        let preparatory = if library.is_some() { goal.only_preparatory() } else { None };
-        let untried = if library.is_some() { preparatory.as_ref() } else { Some(&goal) };
+        let preparatory = if has_library { goal.only_preparatory() } else { None };
+        let untried = if has_library { preparatory.as_ref() } else { Some(&goal) };
         if let Some(untried) = untried
             && let Some(leg) = self.hars.direct(problem, problem.start, untried)
         {

@@ -87,10 +87,9 @@ impl MlpSelector {
         Ok(Self { networks: vec![Trained { path: path.to_owned(), header, network }] })
     }
 
-    /// Reads and checks one network per parking type. Panics when `paths` is empty.
-    pub fn load_all<P: AsRef<Path>>(paths: &[P]) -> Result<Self, ArtefactError> {
-        let (first, rest) = paths.split_first().expect("at least one network");
-        rest.iter().try_fold(Self::load(first.as_ref())?, |all, path| {
+    /// Reads and checks one network per parking type: a first, and any others.
+    pub fn load_all<P: AsRef<Path>>(first: P, others: &[P]) -> Result<Self, ArtefactError> {
+        others.iter().try_fold(Self::load(first.as_ref())?, |all, path| {
             all.combine(Self::load(path.as_ref())?)
         })
     }

@@ -55,20 +55,22 @@ pub fn abstractions(obstacles: &Obstacles, kind: ParkingType, grid: &Grid) -> Ve
 /// Obstacles as bare edges, in one frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Surroundings {
-    /// Those of polygons first, then points as edges of length zero.
+    /// Those of polygons and polylines first, then points as edges of length zero.
     edges: Vec<(Vec2, Vec2)>,
+    /// Which edges are those of one polygon or polyline.
     polygons: Vec<Range<usize>>,
 }
 
 impl Surroundings {
     fn new(obstacles: &Obstacles) -> Self {
         let mut all = Self::default();
-        obstacles.polygons.iter().for_each(|p| all.add_polygon(p.edges()));
-        obstacles.points.iter().for_each(|&p| all.add_point(p));
+        obstacles.polygons().iter().for_each(|p| all.add_polygon(p.edges()));
+        obstacles.polylines().iter().for_each(|p| all.add_polygon(p.edges()));
+        obstacles.points().iter().for_each(|&p| all.add_point(p));
         all
     }
 
-    /// Adds the edges of a polygon. Points come after all polygons.
+    /// Adds the edges of a polygon or a polyline. Points come after all of them.
     pub fn add_polygon(&mut self, edges: impl Iterator<Item = (Vec2, Vec2)>) {
         let first = self.edges.len();
         debug_assert_eq!(first, self.points_begin(), "points come after all polygons");

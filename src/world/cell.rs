@@ -8,7 +8,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Obstacles, ParkingType};
+use super::{ObstacleError, Obstacles, ParkingType};
 use crate::geometry::{Aabb, Polygon, Pose};
 use crate::vehicle::Vehicle;
 
@@ -223,7 +223,7 @@ impl Grid {
     }
 
     /// The complement of a cell's free space near it, as solid walls in the spot frame.
-    pub fn walls(&self, cell: &Cell) -> Obstacles {
+    pub fn walls(&self, cell: &Cell) -> Result<Obstacles, ObstacleError> {
         const T: f64 = 1.0;
         let [lane, spot] = self.regions(cell);
         let boxes = [
@@ -235,7 +235,7 @@ impl Grid {
             Aabb::new(lane.max.x, lane.min.y, lane.max.x + T, lane.max.y),
         ];
         let polygons = boxes.map(|b| Polygon::rectangle(Pose::default(), b)).to_vec();
-        Obstacles { polygons, points: Vec::new() }
+        Obstacles::new(polygons, Vec::new(), Vec::new())
     }
 }
 

@@ -17,5 +17,5 @@ pub mod spot;
 pub mod tpcap;
 
 pub use kind::{Level, ParkingType, UnknownName};
-pub use obstacles::Obstacles;
+pub use obstacles::{ObstacleError, Obstacles};
 pub use scene::Scene;

@@ -1,30 +1,111 @@
 //! Obstacle geometry without an index.
 
-use crate::geometry::{Aabb, Polygon, Vec2};
+use crate::geometry::{Aabb, Polygon, PolygonError, Polyline, Vec2};
 
-/// Solid polygons and single points, all in one frame.
+/// Solid polygons, walls and single points, all in one frame; every coordinate is finite.
+///
+/// What is not valid cannot become obstacles: a planner that leaves out what it does not
+/// understand would drive through it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Obstacles {
-    /// Solid polygons; they may touch or overlap.
-    pub polygons: Vec<Polygon>,
-    /// Single points, as a range sensor sees them.
-    pub points: Vec<Vec2>,
+    polygons: Vec<Polygon>,
+    polylines: Vec<Polyline>,
+    points: Vec<Vec2>,
+}
+
+/// An obstacle that is none.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ObstacleError {
+    /// A polygon or a polyline has a vertex that is NaN or infinite.
+    #[error("{kind} {index} is not valid: it {fault}")]
+    Shape {
+        /// `polygon` or `polyline`.
+        kind: &'static str,
+        /// Its index among those of its kind.
+        index: usize,
+        /// What is wrong with it.
+        fault: PolygonError,
+    },
+    /// A coordinate of a point is NaN or infinite.
+    #[error("point {0} is not a finite point")]
+    Point(usize),
 }
 
 impl Obstacles {
-    /// Whether there is nothing.
-    pub fn is_empty(&self) -> bool {
-        self.polygons.is_empty() && self.points.is_empty()
+    /// Takes obstacles and checks every coordinate.
+    pub fn new(
+        polygons: Vec<Polygon>,
+        polylines: Vec<Polyline>,
+        points: Vec<Vec2>,
+    ) -> Result<Self, ObstacleError> {
+        let is_finite = |p: &Vec2| p.x.is_finite() && p.y.is_finite();
+        // A polygon that was moved into a frame that is not finite has lost its coordinates.
+        let check = |kind, index, vertices: &[Vec2]| match vertices
+            .iter()
+            .position(|v| !is_finite(v))
+        {
+            Some(i) => Err(ObstacleError::Shape { kind, index, fault: PolygonError::NotFinite(i) }),
+            None => Ok(()),
+        };
+        for (i, p) in polygons.iter().enumerate() {
+            check("polygon", i, p.vertices())?;
+        }
+        for (i, p) in polylines.iter().enumerate() {
+            check("polyline", i, p.vertices())?;
+        }
+        match points.iter().position(|p| !is_finite(p)) {
+            Some(i) => Err(ObstacleError::Point(i)),
+            None => Ok(Self { polygons, polylines, points }),
+        }
     }
 
-    /// Every polygon edge, and every point as an edge of length zero.
+    /// Solid polygons; they may touch or overlap.
+    pub fn polygons(&self) -> &[Polygon] {
+        &self.polygons
+    }
+
+    /// Walls of no thickness.
+    pub fn polylines(&self) -> &[Polyline] {
+        &self.polylines
+    }
+
+    /// Single points, as a range sensor sees them.
+    pub fn points(&self) -> &[Vec2] {
+        &self.points
+    }
+
+    /// Whether there is nothing.
+    pub fn is_empty(&self) -> bool {
+        self.polygons.is_empty() && self.polylines.is_empty() && self.points.is_empty()
+    }
+
+    /// Every edge of polygons and polylines, and every point as an edge of length zero.
     pub fn edges(&self) -> impl Iterator<Item = (Vec2, Vec2)> + '_ {
         let points = self.points.iter().map(|&p| (p, p));
-        self.polygons.iter().flat_map(Polygon::edges).chain(points)
+        let walls = self.polylines.iter().flat_map(Polyline::edges);
+        self.polygons.iter().flat_map(Polygon::edges).chain(walls).chain(points)
     }
 
     /// The smallest box around everything.
     pub fn aabb(&self) -> Aabb {
         Aabb::around(self.edges().map(|(a, _)| a))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Pose;
+
+    #[test]
+    fn nothing_that_is_not_finite_becomes_an_obstacle() {
+        let nan = Vec2::new(0.0, f64::NAN);
+        assert_eq!(
+            Obstacles::new(vec![], vec![], vec![Vec2::zeros(), nan]),
+            Err(ObstacleError::Point(1))
+        );
+        let lost =
+            Polygon::rectangle(Pose::new(f64::INFINITY, 0.0, 0.0), Aabb::new(0., 0., 1., 1.));
+        assert!(Obstacles::new(vec![lost], vec![], vec![]).is_err());
     }
 }

@@ -13,9 +13,9 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, error::Category};
 
-use super::{Obstacles, ParkingType, tpcap};
+use super::{ObstacleError, Obstacles, ParkingType, tpcap};
 use crate::files::{reason, write_whole};
-use crate::geometry::{Polygon, Pose, Vec2};
+use crate::geometry::{Polygon, Polyline, Pose, Vec2};
 use crate::vehicle::Vehicle;
 
 /// A parking scene in its own (world) frame; metres and radians.
@@ -37,7 +37,7 @@ pub struct Scene {
     /// A hint of how the goal lies in its spot.
     #[serde(default)]
     pub parking_type: Option<ParkingType>,
-    /// Simple polygons, closed implicitly.
+    /// Simple polygons, closed implicitly; two vertices are a wall without thickness.
     pub obstacles: Vec<Vec<[f64; 2]>>,
     /// Obstacle points, as a range sensor sees them (an extension of the format).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -85,6 +85,16 @@ pub enum SceneError {
         /// with the field.
         message: String,
     },
+}
+
+/// A field with a value that no scene can have.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{field} {message}")]
+pub struct InvalidField {
+    /// The field.
+    pub field: String,
+    /// What is wrong and what would be right; continues a sentence that begins with the field.
+    pub message: String,
 }
 
 impl Scene {
@@ -169,11 +179,34 @@ impl Scene {
         write_whole(path, (json + "\n").as_bytes()).map_err(error)
     }
 
-    /// Checks every number. `path` is where the scene comes from, for the message.
+    /// Checks the name and every number. `path` is where the scene comes from, for the message.
     pub fn validate(&self, path: &Path) -> Result<(), SceneError> {
-        let invalid = |field: String, message: String| {
-            Err(SceneError::Invalid { path: path.to_owned(), field, message })
-        };
+        self.check_name().and_then(|()| self.check_numbers()).map_err(|e| SceneError::Invalid {
+            path: path.to_owned(),
+            field: e.field,
+            message: e.message,
+        })
+    }
+
+    /// Checks that the name can be part of a file's name.
+    fn check_name(&self) -> Result<(), InvalidField> {
+        let invalid = |message| Err(InvalidField { field: "name".to_owned(), message });
+        if let Some(c) = self.name.chars().find(|c| c.is_control()) {
+            return invalid(format!("holds the control character {c:?}; expected plain text"));
+        }
+        let length = self.file_stem().len();
+        if length > Self::MAX_NAME {
+            let most = Self::MAX_NAME;
+            return invalid(format!(
+                "needs {length} bytes in a file name; expected at most {most}"
+            ));
+        }
+        Ok(())
+    }
+
+    /// Checks every number: what planners need to be true.
+    pub(crate) fn check_numbers(&self) -> Result<(), InvalidField> {
+        let invalid = |field: String, message: String| Err(InvalidField { field, message });
         let numbers = |field: &dyn Fn() -> String, values: &[f64]| {
             let Some(v) = values.iter().find(|v| v.is_nan() || v.abs() > Self::MAX_COORDINATE)
             else {
@@ -186,16 +219,6 @@ impl Scene {
             };
             invalid(field(), format!("= {values:?} {message}"))
         };
-        if let Some(c) = self.name.chars().find(|c| c.is_control()) {
-            let message = format!("holds the control character {c:?}; expected plain text");
-            return invalid("name".to_owned(), message);
-        }
-        let length = self.file_stem().len();
-        if length > Self::MAX_NAME {
-            let message =
-                format!("needs {length} bytes in a file name; expected at most {}", Self::MAX_NAME);
-            return invalid("name".to_owned(), message);
-        }
         if let Err(e) = self.vehicle.validate() {
             let message = format!("is {}; it must be {}", e.value, e.expected);
             return invalid(format!("vehicle.{}", e.field), message);
@@ -214,11 +237,13 @@ impl Scene {
             for (j, vertex) in polygon.iter().enumerate() {
                 numbers(&|| format!("obstacles[{i}][{j}]"), vertex)?;
             }
-            if polygon.len() < 3 {
-                let n = polygon.len();
+            if polygon.len() < 2 {
+                let vertices = if polygon.is_empty() { "no vertices" } else { "1 vertex" };
                 return invalid(
                     format!("obstacles[{i}]"),
-                    format!("has {n} vertices; a polygon needs at least 3 (or use \"points\")"),
+                    format!(
+                        "has {vertices}; a polygon needs at least 3, a wall 2 (or use \"points\")"
+                    ),
                 );
             }
         }
@@ -255,22 +280,32 @@ impl Scene {
         stem
     }
 
-    /// The obstacles as geometry, in the scene's frame. Call after [`Scene::validate`].
-    pub fn geometry(&self) -> Obstacles {
+    /// What each obstacle looks like, for drawing: its corners, or the single point.
+    pub fn outlines(&self) -> impl Iterator<Item = Vec<Vec2>> + '_ {
+        let points = self.points.iter().map(std::slice::from_ref);
+        let outlines = self.obstacles.iter().map(Vec::as_slice).chain(points);
+        outlines.map(|o| o.iter().map(|&[x, y]| Vec2::new(x, y)).collect())
+    }
+
+    /// The obstacles as geometry, in the scene's frame.
+    pub fn geometry(&self) -> Result<Obstacles, ObstacleError> {
         self.geometry_by(|v| v)
     }
 
     /// [`Scene::geometry`] with every point mapped by `map`.
-    pub fn geometry_by(&self, map: impl Fn(Vec2) -> Vec2) -> Obstacles {
+    pub fn geometry_by(&self, map: impl Fn(Vec2) -> Vec2) -> Result<Obstacles, ObstacleError> {
         let vec = |&[x, y]: &[f64; 2]| map(Vec2::new(x, y));
-        Obstacles {
-            polygons: self
-                .obstacles
-                .iter()
-                .filter_map(|o| Polygon::new(o.iter().map(&vec).collect()).ok())
-                .collect(),
-            points: self.points.iter().map(vec).collect(),
+        let mut polygons = Vec::with_capacity(self.obstacles.len());
+        let mut walls = Vec::new();
+        for (index, obstacle) in self.obstacles.iter().enumerate() {
+            let vertices: Vec<Vec2> = obstacle.iter().map(&vec).collect();
+            let added = match vertices.len() {
+                2 => Polyline::new(vertices).map(|wall| walls.push(wall)),
+                _ => Polygon::new(vertices).map(|polygon| polygons.push(polygon)),
+            };
+            added.map_err(|fault| ObstacleError::Shape { kind: "polygon", index, fault })?;
         }
+        Obstacles::new(polygons, walls, self.points.iter().map(vec).collect())
     }
 }
 

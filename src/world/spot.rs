@@ -14,7 +14,7 @@
 
 use super::abstraction::{Abstraction, Surroundings, abstractions};
 use super::cell::Grid;
-use super::{Obstacles, ParkingType, Scene};
+use super::{ObstacleError, Obstacles, ParkingType, Scene};
 use crate::geometry::{Aabb, Frame, Pose, Vec2, segment_in_box};
 
 /// How coordinates are taken into the planning frame.
@@ -71,7 +71,7 @@ pub struct SpotGuess {
 }
 
 /// The planning frame of a scene.
-pub fn guess(scene: &Scene, precision: Precision) -> SpotGuess {
+pub fn guess(scene: &Scene, precision: Precision) -> Result<SpotGuess, ObstacleError> {
     let seen = |frame, kind| seen(scene, frame, kind, precision);
     let Some(kind) = scene.parking_type else {
         return match found(scene, precision) {
@@ -80,13 +80,13 @@ pub fn guess(scene: &Scene, precision: Precision) -> SpotGuess {
         };
     };
     let usual = spot_frame(scene, kind);
-    let guess = seen(usual, Some(kind));
+    let guess = seen(usual, Some(kind))?;
     if lane_is_open(&guess.obstacles, kind) || lane(&guess).is_some() {
-        return guess;
+        return Ok(guess);
     }
     // The car may come from the other side, or stand across the lane.
-    let other = seen(other_way(&usual, kind), Some(kind));
-    if lane(&other).is_some() { other } else { guess }
+    let other = seen(other_way(&usual, kind), Some(kind))?;
+    Ok(if lane(&other).is_some() { other } else { guess })
 }
 
 /// The goal's own frame, mirrored where the car would start to its right.
@@ -151,10 +151,15 @@ fn from_parked(p: Vec2, kind: ParkingType, mirrored: bool) -> Vec2 {
     }
 }
 
-fn seen(scene: &Scene, frame: Frame, kind: Option<ParkingType>, precision: Precision) -> SpotGuess {
+fn seen(
+    scene: &Scene,
+    frame: Frame,
+    kind: Option<ParkingType>,
+    precision: Precision,
+) -> Result<SpotGuess, ObstacleError> {
     let view = frame.view();
-    let obstacles = scene.geometry_by(|p| precision.point(view(p)));
-    SpotGuess { frame, kind, obstacles }
+    let obstacles = scene.geometry_by(|p| precision.point(view(p)))?;
+    Ok(SpotGuess { frame, kind, obstacles })
 }
 
 /// The largest free lane beside the spot, if there is one.
@@ -265,7 +270,7 @@ mod tests {
                     let goal = v.rear_axle(Pose::new(0.0, 0.0, kind.goal_heading() * side));
                     let start = Pose::new(-9.0, 5.0 * side, 0.2 * side);
                     let scene = scene(kind, world.compose(start), world.compose(goal));
-                    let g = guess(&scene, Precision::Given);
+                    let g = guess(&scene, Precision::Given).unwrap();
                     assert_eq!(g.frame.mirrored, side < 0.0, "{kind} {turn} {side}");
                     let seen = g.frame.local_from_world(world.compose(goal));
                     let expected = v.rear_axle(Pose::new(0.0, 0.0, kind.goal_heading()));

@@ -48,6 +48,9 @@ impl Trajectory {
     /// Smaller jumps of the steering angle, radians, are driven over and not reported.
     pub const STEER_TOLERANCE: f64 = 1e-4;
 
+    /// The shortest time between two sampled moments of one kind, seconds.
+    pub const LEAST_STEP: f64 = 1e-4;
+
     /// Drives `path` with `vehicle` within `limits`.
     pub fn new(
         path: &Path,
@@ -175,8 +178,11 @@ impl Trajectory {
     /// the car drives, and at standstill the wheels turn steadily.
     ///
     /// A multiple of `step` is left out where it would be nearer than 1 % of a step to another
-    /// kind of moment; so moments are at most 102 % of a step apart. `step` must be positive.
+    /// kind of moment; so moments are at most 102 % of a step apart.
+    ///
+    /// A step below [`Trajectory::LEAST_STEP`], or NaN, counts as that.
     pub fn sample(&self, step: f64) -> Vec<Moment> {
+        let step = Self::LEAST_STEP.max(step);
         let changes: Vec<f64> = self.phases.iter().map(|p| p.time).chain([self.end.time]).collect();
         let is_apart = |time: f64| {
             let after = changes.partition_point(|&c| c <= time);
@@ -270,6 +276,16 @@ mod tests {
         let t = Trajectory::new(&path, &Vehicle::default(), &limits).unwrap();
         let times: Vec<f64> = t.sample(step).iter().map(|m| m.time).collect();
         assert!(times.windows(2).all(|w| w[1] - w[0] <= 1.02 * step), "{times:?}");
+    }
+
+    #[test]
+    fn any_step_gives_finitely_many_moments() {
+        let t = drive(&[(0.0, 0.01)], false);
+        let finest = t.sample(Trajectory::LEAST_STEP);
+        for step in [0.0, -1.0, f64::NAN, 1e-300] {
+            assert_eq!(t.sample(step), finest, "{step}");
+        }
+        assert_eq!(t.sample(f64::INFINITY).len(), t.phases.len() + 1);
     }
 
     #[test]

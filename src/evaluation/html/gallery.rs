@@ -179,8 +179,9 @@ impl SceneView {
     fn new(case: &Case, vehicle: usize, runs: Vec<Run>) -> Self {
         let scene = &case.scene;
         let view = view(scene, &runs).inflated(PADDING);
-        let geometry = scene.geometry();
-        let polygons = geometry.polygons.iter().filter(|p| p.aabb().intersects(&view));
+        let is_near = |o: &Vec<Vec2>| Aabb::around(o.iter().copied()).intersects(&view);
+        let (points, outlines): (Vec<_>, Vec<_>) =
+            scene.outlines().filter(is_near).partition(|o| o.len() == 1);
         let pair = |v: &Vec2| [mm(v.x), mm(v.y)];
         Self {
             name: scene.name.clone(),
@@ -190,8 +191,8 @@ impl SceneView {
             start: scene.start,
             goal: scene.goal,
             view: [view.min.x, view.min.y, view.max.x, view.max.y].map(mm),
-            obstacles: polygons.map(|p| p.vertices().iter().map(pair).collect()).collect(),
-            points: geometry.points.iter().filter(|&&p| view.contains(p)).map(pair).collect(),
+            obstacles: outlines.iter().map(|o| o.iter().map(pair).collect()).collect(),
+            points: points.iter().flatten().map(pair).collect(),
             bounds: scene.bounds.map(|b| b.map(mm)),
             runs,
         }

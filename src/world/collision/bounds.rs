@@ -1,5 +1,7 @@
 //! The region the rear axle stays in.
 
+use std::f64::consts::TAU;
+
 use crate::curves::Segment;
 use crate::geometry::{Aabb, Pose, Vec2};
 
@@ -54,10 +56,11 @@ impl ConvexBounds {
             Vec2::new(to_start.x * ch - to_start.y * sh, to_start.x * sh + to_start.y * ch);
         let radius = radius.abs();
         // The arc's farthest point along a normal is an end, unless the normal's own
-        // direction from the centre lies within the arc.
+        // direction from the centre lies within the arc; in a whole turn every direction does.
+        let least = if turn.abs() >= TAU { -2.0 * radius } else { radius * ch };
         self.sides
             .iter()
-            .all(|(n, offset)| n.dot(&middle) < radius * ch || n.dot(&center) + radius <= *offset)
+            .all(|(n, offset)| n.dot(&middle) < least || n.dot(&center) + radius <= *offset)
     }
 }
 

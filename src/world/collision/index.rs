@@ -30,19 +30,24 @@ struct Cluster {
 
 impl EdgeIndex {
     pub fn new(obstacles: &Obstacles) -> Self {
-        let vertices = obstacles.polygons.iter().map(|p| p.vertices().len()).sum::<usize>();
-        let (polygons, edges) = (obstacles.polygons.len(), vertices + obstacles.points.len());
+        let (polygons, walls) = (obstacles.polygons(), obstacles.polylines());
+        let vertices = polygons.iter().map(|p| p.vertices().len()).sum::<usize>()
+            + walls.iter().map(|w| w.vertices().len()).sum::<usize>();
+        let edges = vertices + obstacles.points().len();
         let mut index = Self {
-            clusters: Vec::with_capacity(polygons + edges / CLUSTER + 1),
-            polygons: Vec::with_capacity(polygons),
+            clusters: Vec::with_capacity(polygons.len() + walls.len() + edges / CLUSTER + 1),
+            polygons: Vec::with_capacity(polygons.len()),
             edges: Vec::with_capacity(edges),
         };
-        for polygon in &obstacles.polygons {
+        for polygon in polygons {
             let edges = index.add(polygon.edges());
             index.polygons.push(Cluster { aabb: polygon.aabb(), edges });
         }
+        for wall in walls {
+            index.add(wall.edges());
+        }
         // Points in stripes of two metres, so that a cluster's points lie together.
-        let mut points = obstacles.points.clone();
+        let mut points = obstacles.points().to_vec();
         points.sort_by(|a, b| {
             let stripe = |p: &Vec2| (p.x / 2.0).floor();
             stripe(a).total_cmp(&stripe(b)).then(a.y.total_cmp(&b.y)).then(a.x.total_cmp(&b.x))
@@ -89,8 +94,9 @@ impl EdgeIndex {
         None
     }
 
-    /// The edge of a number given by [`EdgeIndex::first_near`].
-    pub fn edge(&self, number: usize) -> (Vec2, Vec2) {
-        self.edges[number]
+    /// The edge of a number given by [`EdgeIndex::first_near`]; `None` for a number of another
+    /// index that this one does not have.
+    pub fn edge(&self, number: usize) -> Option<(Vec2, Vec2)> {
+        self.edges.get(number).copied()
     }
 }

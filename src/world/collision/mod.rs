@@ -63,9 +63,18 @@ impl CollisionWorld {
         self.bounds.as_ref().map(ConvexBounds::aabb)
     }
 
-    /// Whether the footprint at `pose` touches nothing and its axle is in bounds.
+    /// Calls `visit` with every edge that may come near `area`; points are edges of length zero.
+    pub fn edges_near(&self, area: &Aabb, mut visit: impl FnMut(Vec2, Vec2)) {
+        self.index.first_near(area, |a, b| {
+            visit(a, b);
+            false
+        });
+    }
+
+    /// Whether the footprint at `pose` touches nothing and its axle is in bounds. A pose that is
+    /// not finite is nowhere, and not free.
     pub fn pose_is_free(&self, pose: Pose) -> bool {
-        if self.bounds.as_ref().is_some_and(|b| !b.contains(pose.position())) {
+        if !pose.is_finite() || self.bounds.as_ref().is_some_and(|b| !b.contains(pose.position())) {
             return false;
         }
         let body = BodyFrame::new(pose);
@@ -103,7 +112,8 @@ impl CollisionWorld {
     }
 
     /// [`CollisionWorld::sweep_is_free`] for many motions in turn, most of them not free: what the
-    /// last of them touched is looked at first, and is kept in `suspect`.
+    /// last of them touched is looked at first, and is kept in `suspect`. It decides only what is
+    /// looked at first: one of another world does no harm.
     pub fn sweep_is_free_of(
         &self,
         suspect: &mut Option<Contact>,
@@ -111,8 +121,8 @@ impl CollisionWorld {
         sweep: &Sweep,
     ) -> bool {
         let again = |&Contact(edge): &Contact| {
-            let (a, b) = self.index.edge(edge);
-            sweep.hits(start.local(a), start.local(b))
+            let touches = |(a, b)| sweep.hits(start.local(a), start.local(b));
+            self.index.edge(edge).is_some_and(touches)
         };
         if suspect.as_ref().is_some_and(again) {
             return false;
@@ -126,8 +136,9 @@ impl CollisionWorld {
     ///
     /// The last segments are checked first: near the goal space is tightest.
     pub fn segments_are_free(&self, start: Pose, segments: &[Segment]) -> bool {
+        // More than a curve has: those beyond are checked in driving order.
         let mut starts = [Pose::default(); 8];
-        assert!(segments.len() <= starts.len(), "at most 8 segments at once");
+        let (segments, beyond) = segments.split_at(segments.len().min(starts.len()));
         let mut pose = start;
         for (slot, s) in starts.iter_mut().zip(segments) {
             *slot = pose;
@@ -135,11 +146,14 @@ impl CollisionWorld {
         }
         let legs = starts.iter().zip(segments);
         legs.rev().all(|(&from, &s)| self.segment_is_free(from, s))
+            && (beyond.is_empty() || self.segments_are_free(pose, beyond))
     }
 
     /// Whether the whole path, its start included, touches nothing.
     pub fn path_is_free(&self, path: &Path) -> bool {
-        self.pose_is_free(path.start) && path.legs().all(|(from, s)| self.segment_is_free(from, s))
+        let is_finite = |s: Segment| s.length.is_finite() && s.curvature.is_finite();
+        self.pose_is_free(path.start)
+            && path.legs().all(|(from, s)| is_finite(s) && self.segment_is_free(from, s))
     }
 }
 

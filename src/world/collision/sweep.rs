@@ -9,7 +9,10 @@
 //!   of the rectangle's sides.
 //!
 //! Both are circle–line intersections; whether an intersection lies within the turned
-//! angle Δ is one dot product with the arc's middle direction: `p·m ≥ ρ² cos(Δ/2)`.
+//! angle Δ is one dot product with the arc's middle direction: `p·m ≥ ρ² cos(Δ/2)`. That holds
+//! up to a whole turn, beyond which nothing new is swept.
+
+use std::f64::consts::TAU;
 
 use crate::curves::Segment;
 use crate::geometry::{Aabb, Vec2, segment_in_box};
@@ -37,6 +40,9 @@ struct ArcSweep {
     /// Cosine and sine of half the turned angle.
     cos_half: f64,
     sin_half: f64,
+    /// What lies on an arc has at least this cosine to its middle: that of half the turned angle;
+    /// for a whole turn less than any cosine.
+    least_cos: f64,
     /// Each corner's arc: middle direction scaled by its radius, and radius squared.
     corners: [(Vec2, f64); 4],
     /// Smallest and largest swept radius, squared.
@@ -59,7 +65,9 @@ impl Sweep {
             return Self { segment, aabb, shape: Shape::Straight };
         }
         let center_y = 1.0 / segment.curvature;
+        let is_whole = turn.abs() >= TAU;
         let (sin_half, cos_half) = (turn / 2.0).sin_cos();
+        let least_cos = if is_whole { -2.0 } else { cos_half };
         let (sin, cos) = (2.0 * sin_half * cos_half, cos_half * cos_half - sin_half * sin_half);
         let mut aabb = Aabb::EMPTY;
         let (mut outer_sq, mut inner_sq) = (0.0_f64, f64::INFINITY);
@@ -75,7 +83,7 @@ impl Sweep {
             // An axis direction within the arc is where it bulges furthest.
             let radius = radius_sq.sqrt();
             for axis in [Vec2::x(), -Vec2::x(), Vec2::y(), -Vec2::y()] {
-                if axis.dot(&middle) >= radius * cos_half {
+                if axis.dot(&middle) >= radius * least_cos {
                     aabb = aabb.include(axis * radius + Vec2::new(0.0, center_y));
                 }
             }
@@ -91,6 +99,7 @@ impl Sweep {
             center_y,
             cos_half,
             sin_half,
+            least_cos,
             corners,
             inner_sq,
             outer_sq,
@@ -143,7 +152,7 @@ impl ArcSweep {
         // Seen from the vehicle the point turns by −Δ; this is the middle of its arc.
         let (c, s) = (self.cos_half, self.sin_half);
         let middle = Vec2::new(q.x * c + q.y * s, q.y * c - q.x * s);
-        let threshold = rho_sq * c;
+        let threshold = rho_sq * self.least_cos;
         let f = &self.footprint;
         let (y_min, y_max) = (f.min.y - self.center_y, f.max.y - self.center_y);
         for x in [f.min.x, f.max.x] {
@@ -186,7 +195,7 @@ impl ArcSweep {
             }
             let root = discriminant.sqrt();
             for t in [(-ad - root) / dd, (-ad + root) / dd] {
-                if (0.0..=1.0).contains(&t) && (a + d * t).dot(&middle) >= rho_sq * self.cos_half {
+                if (0.0..=1.0).contains(&t) && (a + d * t).dot(&middle) >= rho_sq * self.least_cos {
                     return true;
                 }
             }
