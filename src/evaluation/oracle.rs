@@ -22,8 +22,11 @@ use crate::geometry::Pose;
 use crate::vehicle::Vehicle;
 use crate::world::Scene;
 
-/// Footprints are tested at most this far apart along the path, metres.
+/// Footprints are tested at most this far apart along the path, metres; no corner moves more
+/// than twice this between them. For vehicles shorter than [`CHECK_LENGTH`] in proportion.
 pub const CHECK_STEP: f64 = 0.01;
+/// Vehicles from this length on are tested every [`CHECK_STEP`], metres.
+pub const CHECK_LENGTH: f64 = 4.0;
 /// Poses may be this far apart, metres.
 pub const MAX_SPACING: f64 = 0.1;
 /// How deep a footprint may reach into an obstacle, metres.
@@ -348,11 +351,12 @@ impl Oracle {
             return Err(Violation::Start { mm: metres * 1e3, rad });
         }
         self.end(state(n - 1), share)?;
+        let step = CHECK_STEP * (self.vehicle.length / CHECK_LENGTH).min(1.0);
         let mut clearance = f64::INFINITY;
         for i in 0..n - 1 {
             let (curvature, s) =
                 self.motion(i, state(i), state(i + 1), path.gears[i], path.steer[i])?;
-            let steps = (s.abs() / CHECK_STEP).ceil().max(1.0) as usize;
+            let steps = (self.corner_motion(curvature, s) / step).ceil().max(1.0) as usize;
             for k in 0..steps {
                 let at = state(i).driven(curvature, s * k as f64 / steps as f64);
                 self.footprint(i, at, &mut clearance)?;
@@ -360,6 +364,13 @@ impl Oracle {
         }
         self.footprint(n - 1, state(n - 1), &mut clearance)?;
         Ok(clearance)
+    }
+
+    /// How far the rear axle drives, or half of how far any corner may move, whichever is more.
+    fn corner_motion(&self, curvature: f64, s: f64) -> f64 {
+        let v = &self.vehicle;
+        let reach = v.rear_overhang.max(v.length - v.rear_overhang).hypot(v.width / 2.0);
+        s.abs() * 0.5_f64.mul_add(curvature.abs() * reach, 0.5).max(1.0)
     }
 
     /// Whether `end` is the goal, or covers a `share` of the parked footprint.
