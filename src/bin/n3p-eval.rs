@@ -9,7 +9,7 @@ use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::evaluation::report::{self, Provenance};
 use n3p::evaluation::suite::{self, SuiteConfig};
-use n3p::evaluation::{Case, Method, MethodSettings, Models, Outputs, metrics};
+use n3p::evaluation::{Case, Method, MethodSettings, Models, Outputs, metrics, quality};
 use n3p::progress;
 use n3p::rl::source::PolicySource;
 use n3p::training;
@@ -115,7 +115,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
 
     let bar = progress::bar((cases.len() * config.methods.len()) as u64, "evaluate");
     let mut narrow = BTreeSet::new();
-    let rows = suite::run(&cases, &models, &config, 0, |case, episode| {
+    let mut rows = suite::run(&cases, &models, &config, 0, |case, episode| {
         if episode.problem.margin < args.margin {
             narrow.insert(case.scene.name.clone());
         }
@@ -135,10 +135,13 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
     }
 
     let provenance = Provenance::here(scenes, args.seed, args.max_expansions, args.threads.into());
-    outputs.finish("Evaluation", &cases, &rows, &[], &provenance)?;
+    outputs.finish("Evaluation", &cases, &mut rows, &[], &provenance)?;
     if args.json {
         let groups = metrics::summarise(&rows, args.seed);
-        let all = serde_json::json!({"provenance": provenance, "rows": rows, "groups": groups});
+        let quality = quality::summarise(&rows);
+        let all = serde_json::json!({
+            "provenance": provenance, "rows": rows, "groups": groups, "quality": quality,
+        });
         cli::print(format!("{all:#}"))?;
     } else {
         cli::print(report::text(&rows, args.seed).trim_end())?;

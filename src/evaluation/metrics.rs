@@ -145,9 +145,15 @@ fn total(method: &str, all: &[&Row]) -> Totals {
     }
 }
 
-/// Summarises the `rows` whose method applies to their scene by level (hardest last) and
-/// type. `seed` drives the resampling.
-pub fn summarise(rows: &[Row], seed: u64) -> Vec<Group> {
+/// The rows of one level and type, by method in the order of their first rows.
+pub(super) struct Grouped<'a> {
+    pub level: Option<Level>,
+    pub kind: Option<ParkingType>,
+    pub methods: Vec<(&'a str, Vec<&'a Row>)>,
+}
+
+/// The `rows` whose method applies to their scene, by level (hardest last) and type.
+pub(super) fn grouped(rows: &[Row]) -> Vec<Grouped<'_>> {
     let rows: Vec<&Row> = rows.iter().filter(|r| r.applies()).collect();
     let mut keys: Vec<_> = rows.iter().map(|r| (r.level, r.kind)).collect();
     // Types as in every table, scenes of no known type last.
@@ -155,7 +161,7 @@ pub fn summarise(rows: &[Row], seed: u64) -> Vec<Group> {
     keys.sort_by_key(|(level, kind)| (*level, place(*kind).unwrap_or(usize::MAX)));
     keys.dedup();
     let mut groups = Vec::new();
-    for (g, (level, kind)) in keys.into_iter().enumerate() {
+    for (level, kind) in keys {
         let mut methods: Vec<(&str, Vec<&Row>)> = Vec::new();
         for &row in rows.iter().filter(|r| (r.level, r.kind) == (level, kind)) {
             match methods.iter_mut().find(|(name, _)| *name == row.method) {
@@ -163,6 +169,16 @@ pub fn summarise(rows: &[Row], seed: u64) -> Vec<Group> {
                 None => methods.push((&row.method, vec![row])),
             }
         }
+        groups.push(Grouped { level, kind, methods });
+    }
+    groups
+}
+
+/// Summarises the `rows` whose method applies to their scene by level (hardest last) and
+/// type. `seed` drives the resampling.
+pub fn summarise(rows: &[Row], seed: u64) -> Vec<Group> {
+    let mut groups = Vec::new();
+    for (g, Grouped { level, kind, methods }) in grouped(rows).into_iter().enumerate() {
         let reference = methods
             .iter()
             .filter(|(name, _)| name.parse().is_ok_and(Method::is_graph_search))
@@ -297,6 +313,8 @@ pub(super) mod tests {
             fallback: false,
             checked: if ok { "ok".into() } else { String::new() },
             route: String::new(),
+            cost_over_best: None,
+            changes_over_fewest: None,
         }
     }
 

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::super::method::Method;
 use super::super::metrics::{Group, Interval, Summary, Totals};
+use super::super::quality::{self, QualityGroup};
 use super::super::rows::Row;
 use super::super::table::{self, PaperRow, figures, kind_name, level_title, numbers};
 use super::family;
@@ -202,6 +203,39 @@ pub fn paper_ratio(paper: &[PaperRow], group: &Group, summary: &Summary) -> Opti
         searches.filter_map(|m| table::printed(paper, group.level, group.kind, m.name()));
     let reference = searches.min_by(|a, b| mean(a).total_cmp(&mean(b)))?;
     (reference != mine).then(|| mean(reference) / mean(mine))
+}
+
+/// A line of the table of quality.
+#[derive(Serialize)]
+pub struct QualityLine {
+    pub level: String,
+    pub kind: String,
+    /// Whether a new level or type begins here.
+    pub first: bool,
+    pub method: String,
+    pub family: &'static str,
+    pub scenes: usize,
+    pub failed: usize,
+    /// Cost over the best: median, P95, worst; changes beyond the fewest: mean, share of more than
+    /// one, most.
+    pub numbers: [String; 6],
+}
+
+/// Every method's paths against the best of the run.
+pub fn quality(groups: &[QualityGroup]) -> Vec<QualityLine> {
+    let lines = groups.iter().flat_map(|g| {
+        g.methods.iter().enumerate().map(|(i, m)| QualityLine {
+            level: g.level.map_or("files".to_owned(), |l| l.to_string()),
+            kind: kind_name(g.kind),
+            first: i == 0,
+            method: m.method.clone(),
+            family: family(&m.method),
+            scenes: m.scenes,
+            failed: m.failed,
+            numbers: quality::numbers(m),
+        })
+    });
+    lines.collect()
 }
 
 /// A failure, and where in the gallery it can be seen.
