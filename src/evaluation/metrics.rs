@@ -113,16 +113,8 @@ pub struct Totals {
 
 /// The totals of every method, in the order of their first rows.
 pub fn totals(rows: &[Row]) -> Vec<Totals> {
-    let mut methods: Vec<(&str, Vec<&Row>)> = Vec::new();
-    let mut places: HashMap<&str, usize> = HashMap::new();
-    for row in rows {
-        let place = *places.entry(&row.method).or_insert(methods.len());
-        if place == methods.len() {
-            methods.push((&row.method, Vec::new()));
-        }
-        methods[place].1.push(row);
-    }
-    methods.into_iter().map(|(method, rows)| total(method, &rows)).collect()
+    let rows: Vec<&Row> = rows.iter().collect();
+    by_method(&rows).into_iter().map(|(method, rows)| total(method, &rows)).collect()
 }
 
 fn total(method: &str, all: &[&Row]) -> Totals {
@@ -152,6 +144,20 @@ pub(super) struct Grouped<'a> {
     pub methods: Vec<(&'a str, Vec<&'a Row>)>,
 }
 
+/// The `rows` by method, in the order of their first rows.
+pub(super) fn by_method<'a>(rows: &[&'a Row]) -> Vec<(&'a str, Vec<&'a Row>)> {
+    let mut methods: Vec<(&str, Vec<&Row>)> = Vec::new();
+    let mut places: HashMap<&str, usize> = HashMap::new();
+    for &row in rows {
+        let place = *places.entry(&row.method).or_insert(methods.len());
+        if place == methods.len() {
+            methods.push((&row.method, Vec::new()));
+        }
+        methods[place].1.push(row);
+    }
+    methods
+}
+
 /// The `rows` whose method applies to their scene, by level (hardest last) and type.
 pub(super) fn grouped(rows: &[Row]) -> Vec<Grouped<'_>> {
     let rows: Vec<&Row> = rows.iter().filter(|r| r.applies()).collect();
@@ -160,18 +166,12 @@ pub(super) fn grouped(rows: &[Row]) -> Vec<Grouped<'_>> {
     let place = |kind| ParkingType::ALL.iter().position(|k| Some(*k) == kind);
     keys.sort_by_key(|(level, kind)| (*level, place(*kind).unwrap_or(usize::MAX)));
     keys.dedup();
-    let mut groups = Vec::new();
-    for (level, kind) in keys {
-        let mut methods: Vec<(&str, Vec<&Row>)> = Vec::new();
-        for &row in rows.iter().filter(|r| (r.level, r.kind) == (level, kind)) {
-            match methods.iter_mut().find(|(name, _)| *name == row.method) {
-                Some((_, list)) => list.push(row),
-                None => methods.push((&row.method, vec![row])),
-            }
-        }
-        groups.push(Grouped { level, kind, methods });
-    }
-    groups
+    let group = |(level, kind)| {
+        let of_group = |r: &&Row| (r.level, r.kind) == (level, kind);
+        let own: Vec<&Row> = rows.iter().copied().filter(of_group).collect();
+        Grouped { level, kind, methods: by_method(&own) }
+    };
+    keys.into_iter().map(group).collect()
 }
 
 /// Summarises the `rows` whose method applies to their scene by level (hardest last) and

@@ -58,6 +58,15 @@ pub struct Paths {
     pub most_changes: u32,
 }
 
+/// All methods of a run against the best of it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Quality {
+    /// Over all scenes, one per method, in the order of the methods' first rows.
+    pub all: Vec<MethodQuality>,
+    /// By level and type.
+    pub groups: Vec<QualityGroup>,
+}
+
 /// The methods in the scenes of one level and type.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct QualityGroup {
@@ -108,15 +117,35 @@ pub fn fill(rows: &mut [Row]) {
     }
 }
 
-/// Compares the methods by level and type. Rows need not be [`fill`]ed.
-pub fn summarise(rows: &[Row]) -> Vec<QualityGroup> {
+/// Compares the methods, over all scenes and by level and type. Rows need not be [`fill`]ed.
+pub fn summarise(rows: &[Row]) -> Quality {
     let best = best(rows);
+    let compared = |methods: &[(&str, Vec<&Row>)]| {
+        methods.iter().map(|(name, rows)| quality(name, rows, &best)).collect()
+    };
     let group = |g: metrics::Grouped| QualityGroup {
         level: g.level,
         kind: g.kind,
-        methods: g.methods.iter().map(|(name, rows)| quality(name, rows, &best)).collect(),
+        methods: compared(&g.methods),
     };
-    metrics::grouped(rows).into_iter().map(group).collect()
+    let applicable: Vec<&Row> = rows.iter().filter(|r| r.applies()).collect();
+    Quality {
+        all: compared(&metrics::by_method(&applicable)),
+        groups: metrics::grouped(rows).into_iter().map(group).collect(),
+    }
+}
+
+impl Quality {
+    /// Level, type and methods of each part of a table: all scenes first, where there are several
+    /// groups.
+    pub(super) fn parts(&self) -> impl Iterator<Item = (String, String, &[MethodQuality])> {
+        let all = ("all".to_owned(), "all".to_owned(), &self.all[..]);
+        let groups = self.groups.iter().map(|g| {
+            let level = g.level.map_or("files".to_owned(), |l| l.to_string());
+            (level, kind_name(g.kind), &g.methods[..])
+        });
+        (groups.len() > 1).then_some(all).into_iter().chain(groups)
+    }
 }
 
 fn quality(method: &str, rows: &[&Row], best: &HashMap<&str, (f64, u32)>) -> MethodQuality {
@@ -140,13 +169,12 @@ fn quality(method: &str, rows: &[&Row], best: &HashMap<&str, (f64, u32)>) -> Met
     }
 }
 
-/// One line per level, type and method.
-pub fn table(groups: &[QualityGroup]) -> Table {
+/// One line per method, over all and per level and type.
+pub fn table(quality: &Quality) -> Table {
     let mut rows = Vec::new();
-    for group in groups {
-        for m in &group.methods {
-            let level = group.level.map_or("files".to_owned(), |l| l.to_string());
-            let names = [level, kind_name(group.kind), m.method.clone()];
+    for (level, kind, methods) in quality.parts() {
+        for m in methods {
+            let names = [level.clone(), kind.clone(), m.method.clone()];
             let counts = [m.scenes.to_string(), m.failed.to_string()];
             rows.push(names.into_iter().chain(counts).chain(numbers(m)).collect());
         }
@@ -222,14 +250,17 @@ mod tests {
             (None, None),
         ];
         assert_eq!(columns, expected);
-        let groups = summarise(&rows);
-        let [ha, n3p] = &groups[0].methods[..] else { panic!("{groups:?}") };
+        let found = summarise(&rows);
+        let [ha, n3p] = &found.all[..] else { panic!("{found:?}") };
+        assert_eq!(found.groups[0].methods, found.all, "one group");
         assert_eq!((ha.scenes, ha.failed, n3p.scenes, n3p.failed), (2, 0, 2, 1));
         let (ha, n3p) = (ha.paths.unwrap(), n3p.paths.unwrap());
         assert_eq!((ha.median_cost, ha.worst_cost, ha.most_changes), (1.125, 1.25, 0));
         assert_eq!((n3p.worst_cost, n3p.mean_changes, n3p.most_changes), (1.0, 2.0, 2));
         assert_eq!((ha.more_than_one_percent, n3p.more_than_one_percent), (0.0, 100.0));
-        assert_eq!(table(&groups).rows[1][3..6], ["2", "1", "1.000"]);
+        assert_eq!(table(&found).rows[1][..6], ["extreme", "parallel", "n3p", "2", "1", "1.000"]);
+        rows[0].level = None;
+        assert_eq!(table(&summarise(&rows)).rows[0][..4], ["all", "all", "ha-rs", "2"]);
     }
 
     #[test]
@@ -244,10 +275,10 @@ mod tests {
         let mut rows = [row("a", "ha-rs", 1.0, false), row("b", "ha-rs", 1.0, false)];
         fill(&mut rows);
         assert!(rows.iter().all(|r| r.cost_over_best.is_none()));
-        let groups = summarise(&rows);
-        assert_eq!((groups[0].methods[0].failed, groups[0].methods[0].paths), (2, None));
-        assert_eq!(table(&groups).rows[0][5..], ["–"; 6]);
-        assert!(summarise(&[]).is_empty());
+        let found = summarise(&rows);
+        assert_eq!((found.all[0].failed, found.all[0].paths), (2, None));
+        assert_eq!(table(&found).rows[0][5..], ["–"; 6]);
+        assert!(table(&summarise(&[])).rows.is_empty());
     }
 
     /// In every scene somebody is the best, nobody is better, and rows may come in any order.
@@ -274,7 +305,7 @@ mod tests {
                 assert_eq!(costs().count(), of_scene.iter().filter(|r| r.ok).count());
             }
             let by_name = |rows: &[Row]| {
-                let mut methods = summarise(rows).remove(0).methods;
+                let mut methods = summarise(rows).all;
                 methods.sort_by(|a, b| a.method.cmp(&b.method));
                 methods
             };

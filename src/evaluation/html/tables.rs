@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::super::method::Method;
 use super::super::metrics::{Group, Interval, Summary, Totals};
-use super::super::quality::{self, QualityGroup};
+use super::super::quality::{self, Quality};
 use super::super::rows::Row;
 use super::super::table::{self, PaperRow, figures, kind_name, level_title, numbers};
 use super::family;
@@ -222,20 +222,21 @@ pub struct QualityLine {
 }
 
 /// Every method's paths against the best of the run.
-pub fn quality(groups: &[QualityGroup]) -> Vec<QualityLine> {
-    let lines = groups.iter().flat_map(|g| {
-        g.methods.iter().enumerate().map(|(i, m)| QualityLine {
-            level: g.level.map_or("files".to_owned(), |l| l.to_string()),
-            kind: kind_name(g.kind),
+pub fn quality(found: &Quality) -> Vec<QualityLine> {
+    let mut lines = Vec::new();
+    for (level, kind, methods) in found.parts() {
+        lines.extend(methods.iter().enumerate().map(|(i, m)| QualityLine {
+            level: level.clone(),
+            kind: kind.clone(),
             first: i == 0,
             method: m.method.clone(),
             family: family(&m.method),
             scenes: m.scenes,
             failed: m.failed,
             numbers: quality::numbers(m),
-        })
-    });
-    lines.collect()
+        }));
+    }
+    lines
 }
 
 /// A failure, and where in the gallery it can be seen.
