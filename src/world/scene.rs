@@ -87,6 +87,9 @@ pub enum SceneError {
     },
 }
 
+/// A scene file, with its scene or why it holds none.
+pub type FileScene = (PathBuf, Result<Scene, SceneError>);
+
 /// A field with a value that no scene can have.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{field} {message}")]
@@ -137,8 +140,13 @@ impl Scene {
 
     /// Reads every `.json` and `.csv` file of a folder, in the order of their names.
     /// A scene whose name another one has already is called after its file instead, so
-    /// that names are unique.
+    /// that names are unique. Fails with the first file that is no scene.
     pub fn read_dir(dir: &Path) -> Result<Vec<Scene>, SceneError> {
+        Self::read_each(dir)?.into_iter().map(|(_, scene)| scene).collect()
+    }
+
+    /// As [`Scene::read_dir`], but every file is read: each with its scene, or why it holds none.
+    pub fn read_each(dir: &Path) -> Result<Vec<FileScene>, SceneError> {
         let read = |error| SceneError::Read { path: dir.to_owned(), error };
         let mut paths = Vec::new();
         for entry in fs::read_dir(dir).map_err(read)? {
@@ -157,15 +165,18 @@ impl Scene {
         let mut taken = HashSet::new();
         let mut scenes = Vec::with_capacity(paths.len());
         for path in paths {
-            let mut scene = Scene::read(&path)?;
-            if taken.contains(&scene.name) {
-                scene.name = stem(&path);
+            let mut scene = Scene::read(&path);
+            if let Ok(scene) = &mut scene {
+                if taken.contains(&scene.name) {
+                    scene.name = stem(&path);
+                }
+                if taken.contains(&scene.name) {
+                    scene.name =
+                        path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                }
+                taken.insert(scene.name.clone());
             }
-            if taken.contains(&scene.name) {
-                scene.name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            }
-            taken.insert(scene.name.clone());
-            scenes.push(scene);
+            scenes.push((path, scene));
         }
         Ok(scenes)
     }
