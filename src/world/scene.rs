@@ -101,9 +101,16 @@ pub struct InvalidField {
 }
 
 impl Scene {
-    /// Largest |coordinate| of a scene, metres: beyond it `f64` no longer resolves
-    /// what the collision check relies on.
-    pub const MAX_COORDINATE: f64 = 1e7;
+    /// Largest |coordinate| of a scene, metres: 2³⁹, up to which `f64` resolves a tenth of a
+    /// millimetre.
+    pub const MAX_COORDINATE: f64 = (1_u64 << 39) as f64;
+
+    /// How far obstacles and bounds may lie from the start along each axis, metres: beyond it
+    /// `f64` no longer resolves what the collision check relies on.
+    pub const MAX_REACH: f64 = 1e7;
+
+    /// Largest |heading|, radians: beyond it `f64` no longer resolves angles to a few nanoradians.
+    const MAX_HEADING: f64 = 1e7;
 
     /// Largest straight distance between start and goal, metres: paths are sampled and
     /// checked every few centimetres.
@@ -218,24 +225,45 @@ impl Scene {
     /// Checks every number: what planners need to be true.
     pub(crate) fn check_numbers(&self) -> Result<(), InvalidField> {
         let invalid = |field: String, message: String| Err(InvalidField { field, message });
-        let numbers = |field: &dyn Fn() -> String, values: &[f64]| {
-            let Some(v) = values.iter().find(|v| v.is_nan() || v.abs() > Self::MAX_COORDINATE)
-            else {
-                return Ok(());
-            };
-            let message = if v.is_finite() {
-                "is too large; coordinates must lie within ±1e7 (subtract the map's offset)"
+        let Pose { x, y, .. } = self.start;
+        // What is wrong with coordinates, in turn x and y, that may lie `reach` from the start.
+        let fault = |values: &[f64], reach: f64| {
+            let is_far = |(i, v): (usize, &f64)| (v - [x, y][i % 2]).abs() > reach;
+            if !values.iter().all(|v| v.is_finite()) {
+                Some("is not finite; every value must be a finite number")
+            } else if values.iter().any(|v| v.abs() > Self::MAX_COORDINATE) {
+                Some(
+                    "is too large: a number no longer tells tenths of a millimetre there; \
+                     coordinates must lie within ±5.4e11 (subtract the map's offset)",
+                )
+            } else if values.iter().enumerate().any(is_far) {
+                Some("is too far from the start; expected at most 1e7 m along each axis")
             } else {
-                "is not finite; every value must be a finite number"
-            };
-            invalid(field(), format!("= {values:?} {message}"))
+                None
+            }
         };
+        let numbers =
+            |field: &dyn Fn() -> String, values: &[f64]| match fault(values, Self::MAX_REACH) {
+                Some(message) => invalid(field(), format!("= {values:?} {message}")),
+                None => Ok(()),
+            };
         if let Err(e) = self.vehicle.validate() {
             let message = format!("is {}; it must be {}", e.value, e.expected);
             return invalid(format!("vehicle.{}", e.field), message);
         }
-        numbers(&|| "start".to_owned(), &<[f64; 3]>::from(self.start))?;
-        numbers(&|| "goal".to_owned(), &<[f64; 3]>::from(self.goal))?;
+        let poses = [("start", self.start), ("goal", self.goal)];
+        for (field, pose) in poses {
+            let heading = match pose.heading.abs() {
+                h if h <= Self::MAX_HEADING => None,
+                h if h.is_finite() => Some("has too large a heading; expected at most 1e7 rad"),
+                _ => Some("is not finite; every value must be a finite number"),
+            };
+            // Their distance has a limit of its own, below.
+            if let Some(message) = fault(&[pose.x, pose.y], f64::INFINITY).or(heading) {
+                let values = <[f64; 3]>::from(pose);
+                return invalid(field.to_owned(), format!("= {values:?} {message}"));
+            }
+        }
         let distance = self.start.distance(self.goal);
         if distance > Self::MAX_DISTANCE {
             let message = format!(
