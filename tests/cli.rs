@@ -383,3 +383,39 @@ fn wrong_arguments_are_told_in_two_lines() {
         assert!(stderr.trim().lines().count() <= 2, "more than two lines: {stderr}");
     }
 }
+
+/// Planned as if nothing was wrong, and nobody knows why the path is so long.
+#[test]
+fn headings_that_look_like_degrees_are_warned_of_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let plan = |text: &str| {
+        std::fs::write(dir.path().join("s.json"), text).unwrap();
+        let assert = command("n3p-plan", dir.path())
+            .args(["--scene", "s.json", "--method", "ha-rs"])
+            .args(["--max-expansions", "100"])
+            .assert();
+        String::from_utf8_lossy(&assert.get_output().stderr).into_owned()
+    };
+    for (heading, told) in [
+        ("90", "start is 90;"),
+        ("-45", "start is -45;"),
+        ("180.0", "start is 180;"),
+        ("22.5", "start is 22.5;"),
+    ] {
+        let stderr = plan(&SCENE.replace("[-6, 5.5, 0]", &format!("[-6, 9.5, {heading}]")));
+        assert!(stderr.contains("WARN") && stderr.contains(told), "{heading}: {stderr}");
+        assert!(stderr.contains("s.json") && stderr.contains("radians"), "{heading}: {stderr}");
+        assert_eq!(stderr.matches("WARN").count(), 1, "{stderr}");
+    }
+    let both = SCENE.replace("[-6, 5.5, 0]", "[-6, 9.5, 90]").replace("1.5707963267948966", "360");
+    assert!(plan(&both).contains("start is 90, that of goal is 360;"), "{}", plan(&both));
+    // Radians: none, a quarter, a whole turn and a half, one written with few digits.
+    for heading in ["0", "1.5707963267948966", "3", "-6", "9.42477796076938", "6.28"] {
+        let stderr = plan(&SCENE.replace("[-6, 5.5, 0]", &format!("[-6, 9.5, {heading}]")));
+        assert!(!stderr.contains("WARN"), "{heading}: {stderr}");
+    }
+    refused(
+        &SCENE.replace("\"max_steer\": 0.609", "\"max_steer\": 35"),
+        &["vehicle.max_steer is 35", "between 0.01 and 1.5 radians", "degrees"],
+    );
+}

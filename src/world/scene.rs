@@ -6,6 +6,7 @@
 //! The raw benchmark format is in [`tpcap`], the generator in [`generate`](super::generate).
 
 use std::collections::HashSet;
+use std::f64::consts::TAU;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -142,6 +143,9 @@ impl Scene {
             scene.name = stem(path);
         }
         scene.validate(path)?;
+        if let Some(warning) = scene.degrees() {
+            tracing::warn!("{}: {warning}", path.display());
+        }
         Ok(scene)
     }
 
@@ -301,6 +305,22 @@ impl Scene {
             }
         }
         Ok(())
+    }
+
+    /// A warning where headings look like degrees: no scene needs whole turns, and no heading in
+    /// radians is a whole or half number by chance.
+    fn degrees(&self) -> Option<String> {
+        let poses = [("start", self.start.heading), ("goal", self.goal.heading)];
+        let is_suspect = |h: f64| {
+            let halves = 2.0 * h;
+            h.abs() > TAU * 1.0001 && (halves - halves.round()).abs() < 1e-6
+        };
+        let suspects = poses.iter().filter(|(_, h)| is_suspect(*h));
+        let told: Vec<String> = suspects.map(|(field, h)| format!("{field} is {h}")).collect();
+        let what = told.join(", that of ");
+        (!told.is_empty()).then(|| {
+            format!("the heading of {what}; headings are taken as radians (90° is 1.5708)")
+        })
     }
 
     /// The name as part of a file name, where no two names meet: what does not belong there
