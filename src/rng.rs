@@ -35,6 +35,8 @@ pub enum Stream {
     Replay = 11,
     /// Errors of sensors, where they are simulated.
     Noise = 12,
+    /// A scene of clutter.
+    Clutter = 13,
 }
 
 /// The generator of `(seed, stream, index)`.

@@ -5,7 +5,8 @@ mod lots;
 
 use std::path::Path;
 
-use n3p::evaluation::{Method, MethodSettings, Models, PathFile, oracle};
+use n3p::curves::TrajectoryLimits;
+use n3p::evaluation::{Method, MethodSettings, Models, PathFile, TrajectoryFile, oracle};
 use n3p::geometry::{Frame, Pose, Vec2, signed_angle};
 use n3p::planners::{Budget, Problem};
 use n3p::rng::{Stream, rng};
@@ -105,6 +106,41 @@ fn generated_scenes_are_planned_the_same_anywhere() {
 fn scenes_without_a_parking_type_are_understood_the_same_anywhere() {
     let models = Models::load(&["models/knn.bin"]).unwrap();
     check(&generated(3, false), &[Method::N3p], &models);
+}
+
+/// Scenes of a published benchmark lie a million kilometres from the origin. There neighbouring
+/// numbers lie 0.1 µm apart, and 60 µm at the farthest place allowed.
+#[test]
+fn far_away_paths_are_as_long_and_pass_the_independent_check() {
+    let models = Models::load(&["models/knn.bin"]).unwrap();
+    for method in [Method::N3p, Method::HaRs, Method::Ha] {
+        let mut planner = method.build(&models, &MethodSettings::default()).unwrap();
+        for (i, scene) in generated(1, true).into_iter().enumerate() {
+            let mut here = None;
+            for offset in [0.0, 1e6, 1e9, 1e11, Scene::MAX_COORDINATE - 1e3] {
+                let (x, y) = (offset, if i % 2 == 0 { offset } else { -offset / 3.0 });
+                let frame = Frame { origin_in_world: Pose::new(x, y, 0.0), mirrored: false };
+                let there = moved(&scene, &frame);
+                let what = format!("{method}, {} at {offset:e}", scene.name);
+                there.validate(Path::new("far")).unwrap();
+                let problem = Problem::new(&there).expect(&what);
+                let path = planner.plan(&problem, BUDGET).outcome.expect(&what);
+                let file = PathFile::new(&there, &problem.frame, &path, method.name());
+                oracle::check(&there, &file).expect(&what);
+                let ends = [file.poses[0], *file.poses.last().unwrap()];
+                assert_eq!(ends, [there.start, there.goal].map(<[f64; 3]>::from), "{what}");
+                let limits = TrajectoryLimits::default();
+                let file = TrajectoryFile::new(&there, &problem.frame, &path, "far", limits);
+                let moments = file.expect(&what).moments;
+                let ends = [moments[0].pose, moments.last().unwrap().pose];
+                assert_eq!(ends, [there.start, there.goal], "{what}");
+                // At the last place obstacles are rounded so much that a search may go another way.
+                let length = *here.get_or_insert(path.length());
+                let apart = (path.length() - length).abs();
+                assert!(apart < 1e-3 || offset > 1e11, "{what}: {apart} m longer or shorter");
+            }
+        }
+    }
 }
 
 fn check_lots(scenes: &[Scene]) {

@@ -191,20 +191,58 @@ fn eval_refuses_bad_arguments() {
     }
 }
 
+/// One bad file among many used to end the evaluation before it began.
 #[test]
-fn a_scene_in_collision_stops_the_evaluation_before_it_runs() {
+fn files_that_cannot_be_used_are_named_and_the_others_evaluated() {
     let dir = tempfile::tempdir().unwrap();
     let scenes = dir.path().join("scenes");
     std::fs::create_dir(&scenes).unwrap();
-    std::fs::write(scenes.join("a.json"), SCENE).unwrap();
-    let bad = SCENE.replace("\"bay\"", "\"blocked\"").replace("[-6, 5.5, 0]", "[-2, 0, 0]");
-    std::fs::write(scenes.join("b.json"), bad).unwrap();
-    command("n3p-eval", dir.path())
-        .args(["--scenes", "scenes", "--out", "out"])
-        .assert()
-        .code(2)
-        .stderr(contains("blocked").and(contains("start")));
-    assert!(!dir.path().join("out").exists());
+    let blocked = SCENE.replace("\"bay\"", "\"blocked\"").replace("[-6, 5.5, 0]", "[-2, 0, 0]");
+    let narrow = SCENE.replace("\"width\": 1.86", "\"width\": -1");
+    let parallel = SCENE.replace("\"reverse\"", "null");
+    let files = [
+        ("a.json", SCENE),
+        ("b.json", &blocked),
+        ("c.json", &SCENE[..200]),
+        ("d.json", &narrow),
+        ("e.json", &parallel),
+    ];
+    for (name, text) in files {
+        std::fs::write(scenes.join(name), text).unwrap();
+    }
+    let eval = |arguments: &[&str]| {
+        let mut eval = command("n3p-eval", dir.path());
+        eval.args(["--methods", "ha-rs", "--scenes", "scenes"]).args(arguments).assert().code(2)
+    };
+    let assert = eval(&["--out", "out", "--paths", "paths"])
+        .stdout(contains("No failures in 2 rows"))
+        .stderr(contains("error: 3 of 5 files could not be used"));
+    let stderr = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+    for parts in [["b.json", "start: the footprint"], ["c.json", "cut short"], ["d.json", "width"]]
+    {
+        let lines = || stderr.lines().filter(|l| l.contains(parts[0]));
+        assert!(lines().count() == 1 && lines().all(|l| l.contains(parts[1])), "{stderr}");
+    }
+    assert_eq!(stderr.lines().count(), 4, "{stderr}");
+    let rows = rows::read_csv(&dir.path().join("out/rows.csv")).unwrap();
+    let names: Vec<_> = rows.iter().map(|r| r.scene.as_str()).collect();
+    assert_eq!(names, ["bay", "e"]);
+    assert!(rows.iter().all(|r| r.ok && r.cost_over_best == Some(1.0)), "{rows:?}");
+    assert_eq!(std::fs::read_dir(dir.path().join("paths")).unwrap().count(), 2);
+    let report = std::fs::read_to_string(dir.path().join("out/report.md")).unwrap();
+    assert!(report.contains("2 from scenes; 3 of 5 files could not be used"), "{report}");
+    let json = eval(&["--json"]);
+    let json: serde_json::Value = serde_json::from_slice(&json.get_output().stdout).unwrap();
+    assert_eq!(json["rows"].as_array().unwrap().len(), 2);
+    assert_eq!(json["quality"]["all"][0]["paths"]["worst_cost"], 1.0);
+
+    // Where none is left, nothing is begun.
+    for name in ["a.json", "e.json"] {
+        std::fs::remove_file(scenes.join(name)).unwrap();
+    }
+    eval(&["--out", "none"])
+        .stderr(contains("3 of 3 files could not be used").and(contains("blocked")));
+    assert!(!dir.path().join("none").exists());
 }
 
 #[test]
@@ -363,4 +401,40 @@ fn a_policy_that_starts_for_some_workers_only_is_told_and_is_no_bug() {
     let stderr = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
     assert!(stderr.contains("Too many open files"), "{stderr}");
     assert!(!stderr.contains("panicked"), "{stderr}");
+}
+
+/// Planned as if nothing was wrong, and nobody knows why the path is so long.
+#[test]
+fn headings_that_look_like_degrees_are_warned_of_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let plan = |text: &str| {
+        std::fs::write(dir.path().join("s.json"), text).unwrap();
+        let assert = command("n3p-plan", dir.path())
+            .args(["--scene", "s.json", "--method", "ha-rs"])
+            .args(["--max-expansions", "100"])
+            .assert();
+        String::from_utf8_lossy(&assert.get_output().stderr).into_owned()
+    };
+    for (heading, told) in [
+        ("90", "start is 90;"),
+        ("-45", "start is -45;"),
+        ("180.0", "start is 180;"),
+        ("22.5", "start is 22.5;"),
+    ] {
+        let stderr = plan(&SCENE.replace("[-6, 5.5, 0]", &format!("[-6, 9.5, {heading}]")));
+        assert!(stderr.contains("WARN") && stderr.contains(told), "{heading}: {stderr}");
+        assert!(stderr.contains("s.json") && stderr.contains("radians"), "{heading}: {stderr}");
+        assert_eq!(stderr.matches("WARN").count(), 1, "{stderr}");
+    }
+    let both = SCENE.replace("[-6, 5.5, 0]", "[-6, 9.5, 90]").replace("1.5707963267948966", "360");
+    assert!(plan(&both).contains("start is 90, that of goal is 360;"), "{}", plan(&both));
+    // Radians: none, a quarter, a whole turn and a half, one written with few digits.
+    for heading in ["0", "1.5707963267948966", "3", "-6", "9.42477796076938", "6.28"] {
+        let stderr = plan(&SCENE.replace("[-6, 5.5, 0]", &format!("[-6, 9.5, {heading}]")));
+        assert!(!stderr.contains("WARN"), "{heading}: {stderr}");
+    }
+    refused(
+        &SCENE.replace("\"max_steer\": 0.609", "\"max_steer\": 35"),
+        &["vehicle.max_steer is 35", "between 0.01 and 1.5 radians", "degrees"],
+    );
 }

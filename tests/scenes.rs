@@ -86,9 +86,19 @@ fn complaints_name_the_place_and_the_remedy() {
         (json_with("goal", "[0, 1]"), &["goal is [0,1]", "3 finite numbers"]),
         (json_with("obstacles", "[[[0,1],[2,\"x\"],[3,3]]]"), &["obstacles[0][1]", "\"x\""]),
         (json_with("obstacles", "[[[0,1],[2,3,4],[3,3]]]"), &["obstacles[0][1]", "2 finite"]),
-        (json_with("obstacles", "[[[0,1],[2,3]]]"), &["obstacles[0] has 2 vertices", "3"]),
+        (json_with("obstacles", "[[[0,1]]]"), &["obstacles[0] has 1 vertex", "3", "a wall 2"]),
         (json_with("obstacles", "[7]"), &["obstacles[0] is 7"]),
-        (json_with("start", "[0, 2e7, 0]"), &["start = [0.0, 20000000.0, 0.0]", "1e7"]),
+        (json_with("start", "[0, 2e7, 0]"), &["start lies 20000003 m from the goal"]),
+        (
+            json_with("start", "[0, 6e11, 0]"),
+            &["start = [0.0, 600000000000.0, 0.0]", "tenths of a millimetre", "within ±5.4e11"],
+        ),
+        (json_with("goal", "[0, 1, 1e9]"), &["goal = [0.0, 1.0, 1000000000.0]", "1e7 rad"]),
+        (
+            json_with("obstacles", "[[[0,5],[1,2e7],[1,6]]]"),
+            &["obstacles[0][1] = [1.0, 20000000.0]", "from the start", "at most 1e7 m"],
+        ),
+        (json_with("points", "[[0,1],[-2e7,0]]"), &["points[1] = [-20000000.0, 0.0]"]),
         (json_with("bounds", "[0, 0, 0, 5]"), &["bounds", "below its max"]),
         (json_with("bounds", "[0, 0, 9]"), &["bounds is [0,0,9]", "4 finite numbers"]),
         (json_with("parking_type", "\"diagonal\""), &["`diagonal`", "`forward`", "line"]),
@@ -136,7 +146,7 @@ fn tpcap_complaints_give_the_position() {
         ("1,2,0,3,4,0,1,2.5", "value 8 is 2.5; expected the vertex count of obstacle 1 of 1"),
         ("1,2,0,3,4,0,1,3,0,0,1,1,2", "ends after 13 values; expected at least 14"),
         ("1,2,0,3,4,0,1,3,0,0,1,1,2,0,9", "holds 15 values, 1 too many"),
-        ("1,2,0,3,4,0,1,3,0,0,1,1,1,1", "obstacles[0] has 2 vertices"),
+        ("1,2,0,3,4,0,1,3,0,0,0,0,0,0", "obstacles[0] has 1 vertex"),
         ("1,2,0,3,4,0,900000,3", "ends after 8 values"),
     ];
     for (content, part) in cases {
@@ -209,16 +219,22 @@ proptest! {
     #[test]
     fn every_number_survives_a_round_trip(
         v in prop::collection::vec((-1e7..1e7f64, -1.0..1.0f64), 3..20),
-        // So far from the border that the goal lies within it, too.
-        start in prop::array::uniform3(-9.99e6..9.99e6f64),
+        // Not quite as far as scenes may lie, so that all of it does.
+        (x, y) in (-5.4e11..5.4e11f64, -5.4e11..5.4e11f64),
+        scale in 0.0..1.0f64,
+        heading in -9.99e6..9.99e6f64,
         away in -7e3..7e3f64,
     ) {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("scene.json");
         let mut scene = Scene::read(&fixture("points.json")).unwrap();
-        scene.start = start.into();
+        // All orders of magnitude.
+        let (x, y) = (x * scale.powi(40), y * scale.powi(20));
+        scene.start = [x, y, heading].into();
         scene.goal = scene.start.shifted(away);
-        scene.obstacles = vec![v.iter().map(|&(x, y)| [x, y * 1e-9]).collect()];
+        scene.obstacles = vec![v.iter().map(|&(dx, dy)| [x + 0.999 * dx, y + dy * 1e-9]).collect()];
+        scene.points = vec![[x, y + 1.0 / 3.0]];
+        scene.bounds = Some([x - 7.0, y - 8.0, x + 9.0, y + 10.0]);
         scene.write(&path).unwrap();
         prop_assert_eq!(Scene::read(&path).unwrap(), scene);
     }

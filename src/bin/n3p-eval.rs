@@ -9,7 +9,7 @@ use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::evaluation::report::{self, Provenance};
 use n3p::evaluation::suite::{self, SuiteConfig, SuiteError};
-use n3p::evaluation::{Case, Method, MethodSettings, Models, Outputs, metrics};
+use n3p::evaluation::{Case, Method, MethodSettings, Models, Outputs, metrics, quality};
 use n3p::progress;
 use n3p::rl::source::PolicySource;
 use n3p::training;
@@ -110,7 +110,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
     }
     config.build_all(&models).or_bad_input()?;
     let vehicle = vehicle.or(models.vehicle()).unwrap_or_default();
-    let (cases, scenes) = cases(args, &vehicle, &config.methods, &models)?;
+    let Chosen { cases, title, complaint } = choose(args, &vehicle, &config.methods, &models)?;
     suite::check(&cases, &models, &config).or_bad_input()?;
     let mut outputs = Outputs::create(args.out.as_deref(), args.paths.as_deref()).or_bad_input()?;
 
@@ -125,7 +125,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
         outputs.take(case, episode, &models).map_err(anyhow::Error::from)
     });
     // As in the checks before: a suite that cannot run is the user's to mend, a full disk is not.
-    let rows = rows.map_err(|error| match error.downcast::<SuiteError>() {
+    let mut rows = rows.map_err(|error| match error.downcast::<SuiteError>() {
         Ok(suite) => BadInput(suite.to_string()).into(),
         Err(other) => other,
     })?;
@@ -140,29 +140,39 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
         );
     }
 
-    let provenance = Provenance::here(scenes, args.seed, args.max_expansions, args.threads.into());
-    outputs.finish("Evaluation", &cases, &rows, &[], &provenance)?;
+    let provenance = Provenance::here(title, args.seed, args.max_expansions, args.threads.into());
+    outputs.finish("Evaluation", &cases, &mut rows, &[], &provenance)?;
     if args.json {
         let groups = metrics::summarise(&rows, args.seed);
-        let all = serde_json::json!({"provenance": provenance, "rows": rows, "groups": groups});
+        let quality = quality::summarise(&rows);
+        let all = serde_json::json!({
+            "provenance": provenance, "rows": rows, "groups": groups, "quality": quality,
+        });
         cli::print(format!("{all:#}"))?;
     } else {
         cli::print(report::text(&rows, args.seed).trim_end())?;
     }
-    Ok(ExitCode::SUCCESS)
+    // Everything is written; the exit code still says that not everything was evaluated.
+    complaint.map_or(Ok(ExitCode::SUCCESS), |text| Err(BadInput(text).into()))
 }
 
-/// The scenes, and what to call them in the report.
-fn cases(
-    args: &Args,
-    vehicle: &Vehicle,
-    methods: &[Method],
-    models: &Models,
-) -> Result<(Vec<Case>, String)> {
+/// The scenes to plan.
+struct Chosen {
+    cases: Vec<Case>,
+    /// What to call them in the report.
+    title: String,
+    /// What could not be used, if anything.
+    complaint: Option<String>,
+}
+
+fn choose(args: &Args, vehicle: &Vehicle, methods: &[Method], models: &Models) -> Result<Chosen> {
     if let Some(dir) = &args.scenes {
-        let cases = suite::from_folder(dir, args.kind).or_bad_input()?;
-        let title = format!("{} from {}", cases.len(), dir.display());
-        return Ok((cases, title));
+        let folder = suite::from_folder(dir, args.kind, args.margin).or_bad_input()?;
+        folder.unusable.iter().for_each(|line| tracing::warn!("left out: {line}"));
+        let complaint = folder.complaint();
+        let left_out = complaint.as_ref().map_or(String::new(), |text| format!("; {text}"));
+        let title = format!("{} from {}{left_out}", folder.cases.len(), dir.display());
+        return Ok(Chosen { cases: folder.cases, title, complaint });
     }
     // Without --type: all that the models of the chosen methods know.
     let known =
@@ -180,5 +190,5 @@ fn cases(
         args.count,
         args.seed
     );
-    Ok((cases, title))
+    Ok(Chosen { cases, title, complaint: None })
 }

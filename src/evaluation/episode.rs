@@ -121,6 +121,8 @@ fn blank_row(case: &Case, method: &str, plan_time_s: f64) -> Row {
         fallback: false,
         checked: String::new(),
         route: String::new(),
+        cost_over_best: None,
+        changes_over_fewest: None,
     }
 }
 

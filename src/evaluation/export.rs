@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::curves::Path;
 use crate::files::{reason, write_whole};
-use crate::geometry::{Frame, Pose, signed_angle};
+use crate::geometry::{Frame, Pose, Vec2, signed_angle};
 use crate::world::Scene;
 
 /// A planned path, as exported.
@@ -57,7 +57,9 @@ impl PathFile {
 
     /// The export of `path`, planned in `frame` for `scene`.
     pub fn new(scene: &Scene, frame: &Frame, path: &Path, method: &str) -> Self {
-        let mut samples = path.to_world(frame).sample(Self::STEP);
+        let near = Near::new(scene, frame);
+        let mut samples = path.to_world(&near.frame).sample(Self::STEP);
+        samples.iter_mut().for_each(|s| s.pose = near.to_world(s.pose));
         if let Some(first) = samples.first_mut() {
             first.pose = snap(first.pose, scene.start);
         }
@@ -104,7 +106,34 @@ impl PathFile {
 /// `exact`, where `pose` is as near as rounding leaves it; else `pose`.
 pub(super) fn snap(pose: Pose, exact: Pose) -> Pose {
     let turn = signed_angle(pose.heading, exact.heading).abs();
-    if pose.distance(exact).max(turn) <= PathFile::SNAP { exact } else { pose }
+    // Far from the origin frame and pose are both rounded to what coordinates resolve there.
+    let near = PathFile::SNAP + 4.0 * exact.resolution();
+    if pose.distance(exact) <= near && turn <= PathFile::SNAP { exact } else { pose }
+}
+
+/// Where paths are driven before they are put into the world: the world itself, and around the
+/// start of scenes so far away that rounding, pose after pose, would add up to what can be seen.
+pub(super) struct Near {
+    origin: Vec2,
+    /// The planning frame, seen from here.
+    pub frame: Frame,
+}
+
+impl Near {
+    /// Farther than this from the origin is far, metres: up to here coordinates resolve 2 nm.
+    const FAR: f64 = 1e7;
+
+    pub fn new(scene: &Scene, frame: &Frame) -> Self {
+        let start = scene.start.position();
+        let origin = if start.amax() > Self::FAR { start } else { Vec2::zeros() };
+        let Frame { origin_in_world: o, mirrored } = *frame;
+        let origin_in_world = Pose::new(o.x - origin.x, o.y - origin.y, o.heading);
+        Self { origin, frame: Frame { origin_in_world, mirrored } }
+    }
+
+    pub fn to_world(&self, pose: Pose) -> Pose {
+        Pose::new(pose.x + self.origin.x, pose.y + self.origin.y, pose.heading)
+    }
 }
 
 #[cfg(test)]

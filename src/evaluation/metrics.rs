@@ -113,16 +113,8 @@ pub struct Totals {
 
 /// The totals of every method, in the order of their first rows.
 pub fn totals(rows: &[Row]) -> Vec<Totals> {
-    let mut methods: Vec<(&str, Vec<&Row>)> = Vec::new();
-    let mut places: HashMap<&str, usize> = HashMap::new();
-    for row in rows {
-        let place = *places.entry(&row.method).or_insert(methods.len());
-        if place == methods.len() {
-            methods.push((&row.method, Vec::new()));
-        }
-        methods[place].1.push(row);
-    }
-    methods.into_iter().map(|(method, rows)| total(method, &rows)).collect()
+    let rows: Vec<&Row> = rows.iter().collect();
+    by_method(&rows).into_iter().map(|(method, rows)| total(method, &rows)).collect()
 }
 
 fn total(method: &str, all: &[&Row]) -> Totals {
@@ -145,24 +137,48 @@ fn total(method: &str, all: &[&Row]) -> Totals {
     }
 }
 
-/// Summarises the `rows` whose method applies to their scene by level (hardest last) and
-/// type. `seed` drives the resampling.
-pub fn summarise(rows: &[Row], seed: u64) -> Vec<Group> {
+/// The rows of one level and type, by method in the order of their first rows.
+pub(super) struct Grouped<'a> {
+    pub level: Option<Level>,
+    pub kind: Option<ParkingType>,
+    pub methods: Vec<(&'a str, Vec<&'a Row>)>,
+}
+
+/// The `rows` by method, in the order of their first rows.
+pub(super) fn by_method<'a>(rows: &[&'a Row]) -> Vec<(&'a str, Vec<&'a Row>)> {
+    let mut methods: Vec<(&str, Vec<&Row>)> = Vec::new();
+    let mut places: HashMap<&str, usize> = HashMap::new();
+    for &row in rows {
+        let place = *places.entry(&row.method).or_insert(methods.len());
+        if place == methods.len() {
+            methods.push((&row.method, Vec::new()));
+        }
+        methods[place].1.push(row);
+    }
+    methods
+}
+
+/// The `rows` whose method applies to their scene, by level (hardest last) and type.
+pub(super) fn grouped(rows: &[Row]) -> Vec<Grouped<'_>> {
     let rows: Vec<&Row> = rows.iter().filter(|r| r.applies()).collect();
     let mut keys: Vec<_> = rows.iter().map(|r| (r.level, r.kind)).collect();
     // Types as in every table, scenes of no known type last.
     let place = |kind| ParkingType::ALL.iter().position(|k| Some(*k) == kind);
     keys.sort_by_key(|(level, kind)| (*level, place(*kind).unwrap_or(usize::MAX)));
     keys.dedup();
+    let group = |(level, kind)| {
+        let of_group = |r: &&Row| (r.level, r.kind) == (level, kind);
+        let own: Vec<&Row> = rows.iter().copied().filter(of_group).collect();
+        Grouped { level, kind, methods: by_method(&own) }
+    };
+    keys.into_iter().map(group).collect()
+}
+
+/// Summarises the `rows` whose method applies to their scene by level (hardest last) and
+/// type. `seed` drives the resampling.
+pub fn summarise(rows: &[Row], seed: u64) -> Vec<Group> {
     let mut groups = Vec::new();
-    for (g, (level, kind)) in keys.into_iter().enumerate() {
-        let mut methods: Vec<(&str, Vec<&Row>)> = Vec::new();
-        for &row in rows.iter().filter(|r| (r.level, r.kind) == (level, kind)) {
-            match methods.iter_mut().find(|(name, _)| *name == row.method) {
-                Some((_, list)) => list.push(row),
-                None => methods.push((&row.method, vec![row])),
-            }
-        }
+    for (g, Grouped { level, kind, methods }) in grouped(rows).into_iter().enumerate() {
         let reference = methods
             .iter()
             .filter(|(name, _)| name.parse().is_ok_and(Method::is_graph_search))
@@ -297,6 +313,8 @@ pub(super) mod tests {
             fallback: false,
             checked: if ok { "ok".into() } else { String::new() },
             route: String::new(),
+            cost_over_best: None,
+            changes_over_fewest: None,
         }
     }
 

@@ -36,6 +36,10 @@ pub const END_TOL: f64 = 1e-6;
 /// How near each pose must be to where gear and steering lead from the one before,
 /// metres and radians: wide enough for an end that was snapped by [`END_TOL`].
 pub const MOTION_TOL: f64 = 1e-5;
+/// To these, and to bounds, comes what coordinates do not resolve where the scene lies: so many times
+/// the distance between neighbouring numbers. Below a nanometre on a city's map, half a micrometre
+/// 10⁶ km away.
+pub const ROUNDING_STEPS: f64 = 4.0;
 /// Relative excess of the curvature limit that passes.
 pub const CURVATURE_TOL: f64 = 1e-6;
 
@@ -300,6 +304,8 @@ impl Body {
 /// A scene made ready, in coordinates relative to its start: scenes may lie anywhere.
 struct Oracle {
     origin: Vector2,
+    /// How far rounding may put a pose aside, metres.
+    rounding: f64,
     vehicle: Vehicle,
     start: State,
     goal: State,
@@ -316,6 +322,7 @@ impl Oracle {
         let state = |p: Pose| State { position: local(p.x, p.y), heading: p.heading };
         Self {
             origin,
+            rounding: ROUNDING_STEPS * scene.start.resolution().max(scene.goal.resolution()),
             vehicle: scene.vehicle,
             start: state(scene.start),
             goal: state(scene.goal),
@@ -347,7 +354,7 @@ impl Oracle {
             State { position: Vector2::new(x, y) - self.origin, heading }
         };
         let (metres, rad) = state(0).apart(self.start);
-        if metres > END_TOL || rad > END_TOL {
+        if metres > END_TOL + self.rounding || rad > END_TOL {
             return Err(Violation::Start { mm: metres * 1e3, rad });
         }
         self.end(state(n - 1), share)?;
@@ -377,7 +384,7 @@ impl Oracle {
     fn end(&self, end: State, share: Option<f64>) -> Result<(), Violation> {
         let Some(share) = share else {
             let (metres, rad) = end.apart(self.goal);
-            let at_goal = metres <= END_TOL && rad <= END_TOL;
+            let at_goal = metres <= END_TOL + self.rounding && rad <= END_TOL;
             return at_goal.then_some(()).ok_or(Violation::Goal { mm: metres * 1e3, rad });
         };
         let body = |state| Body::new(&self.vehicle, state);
@@ -407,7 +414,7 @@ impl Oracle {
         }
         let (sin, cos) = from.heading.sin_cos();
         let along = step.dot(Vector2::new(cos, sin));
-        if along * f64::from(gear) < -MOTION_TOL {
+        if along * f64::from(gear) < -(MOTION_TOL + self.rounding) {
             return Err(Violation::Gear { pose, gear });
         }
         // The arc over a chord: c = 2/κ · sin(κ s / 2).
@@ -415,7 +422,9 @@ impl Oracle {
         let arc = if half < 1e-8 { chord } else { 2.0 / curvature.abs() * half.min(1.0).asin() };
         let s = arc * f64::from(gear);
         let (metres, rad) = from.driven(curvature, s).apart(to);
-        if metres > MOTION_TOL || rad > MOTION_TOL {
+        // A chord that is a little too long turns a little too far.
+        let turn = self.rounding * curvature.abs();
+        if metres > MOTION_TOL + self.rounding || rad > MOTION_TOL + turn {
             return Err(Violation::Motion { pose, mm: metres * 1e3, rad });
         }
         Ok((curvature, s))
@@ -425,7 +434,7 @@ impl Oracle {
     fn footprint(&self, pose: usize, at: State, clearance: &mut f64) -> Result<(), Violation> {
         if let Some(Extent { min, max }) = self.bounds {
             let out = (min - at.position).max(at.position - max).max_element();
-            if out > END_TOL {
+            if out > END_TOL + self.rounding {
                 return Err(Violation::OutOfBounds { pose, mm: out * 1e3 });
             }
         }

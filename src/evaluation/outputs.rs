@@ -9,6 +9,7 @@ use super::export::{PathFile, PathFileError};
 use super::html;
 use super::learning_curve::CurvePoint;
 use super::models::Models;
+use super::quality;
 use super::report::{self, Provenance};
 use super::rows::{self, Row, RowWriter, RowsError};
 use super::trace::{self, Trace, TraceWriter};
@@ -119,17 +120,20 @@ impl Outputs {
         Ok(())
     }
 
-    /// Writes `rows.parquet`, `report.md` and `report.html`, where an output folder is wanted.
+    /// Compares the rows of a run that is complete ([`quality::fill`]), then writes `rows.csv`
+    /// anew, `rows.parquet`, `report.md` and `report.html`, where an output folder is wanted.
     /// `cases` are the scenes of `rows`; `curve` may be empty.
     pub fn finish(
         self,
         title: &str,
         cases: &[Case],
-        rows: &[Row],
+        rows: &mut [Row],
         curve: &[CurvePoint],
         provenance: &Provenance,
     ) -> Result<(), OutputError> {
+        quality::fill(rows);
         let Some(dir) = self.out else { return Ok(()) };
+        rows::write_csv(&dir.join("rows.csv"), rows)?;
         rows::write_parquet(&dir.join("rows.parquet"), rows)?;
         let write = |name: &str, text: String| {
             let path = dir.join(name);

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::learning_curve::{self, CurvePoint};
 use super::metrics;
+use super::quality;
 use super::rows::Row;
 use super::table;
 use crate::dataset::schema::GIT_REVISION;
@@ -80,6 +81,7 @@ pub fn text(rows: &[Row], seed: u64) -> String {
         let _ = writeln!(out, "{}", table.text());
     }
     let _ = writeln!(out, "{}", table::speed_ups(&groups).text());
+    let _ = writeln!(out, "{}", quality::table(&quality::summarise(rows)).text());
     let failures = table::failures(rows);
     if failures.rows.is_empty() {
         let applicable = rows.iter().filter(|r| r.applies()).count();
@@ -113,6 +115,8 @@ pub fn markdown(
     }
     let _ = write!(out, "\n{}", table::speed_ups(&groups).markdown());
     let _ = write!(out, "\n{NOTES}");
+    let quality = quality::table(&quality::summarise(rows));
+    let _ = write!(out, "\n{}\n{}\n", quality.markdown(), quality::NOTE);
     let failures = table::failures(rows);
     if failures.rows.is_empty() {
         out += "\n## Failures\n\nNone.\n";

@@ -1,7 +1,8 @@
 //! Rows: one per (scene, method), the record every table is made of.
 //!
 //! [`RowWriter`] appends to `rows.csv` as rows come and flushes each, so that an
-//! interrupted run keeps what it did; [`write_parquet`] adds `rows.parquet` at the end.
+//! interrupted run keeps what it did. At the end [`write_csv`] writes them anew, with the columns
+//! that compare them, and [`write_parquet`] adds `rows.parquet`.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -53,11 +54,16 @@ pub struct Row {
     pub checked: String,
     /// How a guided planner came to its path: `library`, `direct`, `searched`, `fallback`.
     pub route: String,
+    /// Cost of the path over that of the cheapest in the scene: see [`super::quality`], which
+    /// fills this and the next once a run is complete.
+    pub cost_over_best: Option<f64>,
+    /// Gear changes beyond the fewest of any method in the scene.
+    pub changes_over_fewest: Option<u32>,
 }
 
 impl Row {
     /// Names of the columns, in order.
-    pub const COLUMNS: [&'static str; 16] = [
+    pub const COLUMNS: [&'static str; 18] = [
         "scene",
         "type",
         "level",
@@ -74,7 +80,12 @@ impl Row {
         "fallback",
         "checked",
         "route",
+        "cost_over_best",
+        "changes_over_fewest",
     ];
+
+    /// How many columns at the end compare a row with others. Files of before have none of them.
+    pub const COMPARING: usize = 2;
 
     /// Whether the method is made for such scenes. Rows of one that is not are kept, but they
     /// are no failures and enter no table.
@@ -107,7 +118,7 @@ impl Row {
     }
 
     /// The values as text, in the order of [`Row::COLUMNS`].
-    pub fn fields(&self) -> [String; 16] {
+    pub fn fields(&self) -> [String; 18] {
         fn text<T: ToString>(v: &Option<T>) -> String {
             v.as_ref().map(T::to_string).unwrap_or_default()
         }
@@ -128,6 +139,8 @@ impl Row {
             self.fallback.to_string(),
             self.checked.clone(),
             self.route.clone(),
+            text(&self.cost_over_best),
+            text(&self.changes_over_fewest),
         ]
     }
 
@@ -163,6 +176,8 @@ impl Row {
             fallback: parse(f, 13)?,
             checked: f[14].clone(),
             route: f[15].clone(),
+            cost_over_best: maybe(f, 16)?,
+            changes_over_fewest: maybe(f, 17)?,
         })
     }
 }
@@ -222,21 +237,36 @@ impl RowWriter {
     }
 }
 
-/// Reads a `rows.csv`. A last line without line break (an interrupted run) is left out.
+/// Writes a `rows.csv` whole, to a temporary name first.
+pub fn write_csv(path: &Path, rows: &[Row]) -> Result<(), RowsError> {
+    let header = Row::COLUMNS.join(",") + "\n";
+    let text: String = [header].into_iter().chain(rows.iter().map(Row::to_csv)).collect();
+    write_whole(path, text.as_bytes())
+        .map_err(|error| RowsError::Io { path: path.to_owned(), error })
+}
+
+/// Reads a `rows.csv`, also one of before, without the last columns. A last line without line
+/// break (an interrupted run) is left out.
 pub fn read_csv(path: &Path) -> Result<Vec<Row>, RowsError> {
     let text = std::fs::read_to_string(path)
         .map_err(|error| RowsError::Io { path: path.to_owned(), error })?;
     let complete = text.rfind('\n').map_or("", |end| &text[..=end]);
     let mut rows = Vec::new();
+    let mut missing = 0;
     for (i, line) in complete.lines().enumerate() {
         let format = |message| RowsError::Format { path: path.to_owned(), line: i + 1, message };
         if i == 0 {
-            if line != Row::COLUMNS.join(",") {
-                return Err(format("expected the header of a rows.csv".to_owned()));
-            }
+            let is_header =
+                |less: &usize| line == Row::COLUMNS[..Row::COLUMNS.len() - less].join(",");
+            missing = [0, Row::COMPARING]
+                .into_iter()
+                .find(is_header)
+                .ok_or_else(|| format("expected the header of a rows.csv".to_owned()))?;
             continue;
         }
-        rows.push(Row::from_fields(&split(line)).map_err(format)?);
+        let mut fields = split(line);
+        fields.resize(fields.len() + missing, String::new());
+        rows.push(Row::from_fields(&fields).map_err(format)?);
     }
     Ok(rows)
 }
@@ -273,6 +303,8 @@ pub fn write_parquet(path: &Path, rows: &[Row]) -> Result<(), RowsError> {
         flag(|r| Some(r.fallback)),
         text(|r| Some(r.checked.clone())),
         text(|r| Some(r.route.clone())),
+        number(|r| r.cost_over_best),
+        count(|r| r.changes_over_fewest),
     ];
     let named = Row::COLUMNS.into_iter().zip(columns).map(|(name, column)| (name, column, true));
     let batch = RecordBatch::try_from_iter_with_nullable(named)
@@ -334,7 +366,24 @@ mod tests {
             fallback: true,
             checked: "pose 3: moves against gear 1".into(),
             route: "fallback".into(),
+            cost_over_best: Some(1.0 + 1.0 / 3.0),
+            changes_over_fewest: Some(1),
         }
+    }
+
+    #[test]
+    fn files_of_before_are_read_without_the_last_columns() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("rows.csv");
+        write_csv(&path, &[row(), row()]).unwrap();
+        assert_eq!(read_csv(&path).unwrap(), [row(), row()]);
+        let text = std::fs::read_to_string(&path).unwrap();
+        let kept = |line: &str| line.rsplitn(3, ',').nth(2).unwrap().to_owned() + "\n";
+        std::fs::write(&path, text.lines().map(kept).collect::<String>()).unwrap();
+        let before = Row { cost_over_best: None, changes_over_fewest: None, ..row() };
+        assert_eq!(read_csv(&path).unwrap(), [before.clone(), before]);
+        std::fs::write(&path, text.replace(",changes_over_fewest", "")).unwrap();
+        assert!(read_csv(&path).unwrap_err().to_string().contains("header"));
     }
 
     #[test]

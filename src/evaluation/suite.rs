@@ -90,21 +90,68 @@ pub fn generated(
     Ok(cases)
 }
 
-/// The scenes of a folder, of one parking type if `kind` is given.
-pub fn from_folder(dir: &Path, kind: Option<ParkingType>) -> Result<Vec<Case>, SuiteError> {
-    let cases: Vec<Case> = Scene::read_dir(dir)?
-        .into_iter()
-        .filter(|scene| kind.is_none() || scene.parking_type == kind)
-        .map(|scene| Case { kind: scene.parking_type, level: None, scene })
-        .collect();
-    if cases.is_empty() {
-        let what = kind.map_or(String::new(), |k| format!(" of type {k}"));
-        return Err(SuiteError::NoScenes(format!(
-            "{}: holds no scenes{what}; expected .json or .csv scene files",
-            dir.display()
-        )));
+/// What a folder of scene files holds.
+#[derive(Debug)]
+pub struct Folder {
+    /// The scenes that can be planned.
+    pub cases: Vec<Case>,
+    /// Why other files cannot be used, one line each.
+    pub unusable: Vec<String>,
+    /// How many scene files there are.
+    pub files: usize,
+}
+
+impl Folder {
+    /// How many files could not be used, in words; `None` if all could.
+    pub fn complaint(&self) -> Option<String> {
+        let (bad, files) = (self.unusable.len(), self.files);
+        let noun = if files == 1 { "file" } else { "files" };
+        (bad > 0).then(|| format!("{bad} of {files} {noun} could not be used"))
     }
-    Ok(cases)
+}
+
+/// The scenes of a folder, of one parking type if `kind` is given. Files that hold no scene, or one
+/// whose start or goal is not free with `margin_m`, are left out and named. Where that leaves
+/// nothing, or there is nothing, it is an error.
+pub fn from_folder(
+    dir: &Path,
+    kind: Option<ParkingType>,
+    margin_m: f64,
+) -> Result<Folder, SuiteError> {
+    let read = Scene::read_each(dir)?;
+    let mut folder = Folder { cases: Vec::new(), unusable: Vec::new(), files: read.len() };
+    for (path, scene) in read {
+        let scene = match scene {
+            Ok(scene) if kind.is_some() && scene.parking_type != kind => continue,
+            Ok(scene) => scene,
+            Err(error) => {
+                folder.unusable.push(error.to_string());
+                continue;
+            }
+        };
+        match Problem::with_margin(&scene, margin_m) {
+            Ok(_) => folder.cases.push(Case { kind: scene.parking_type, level: None, scene }),
+            Err(error) => {
+                let scene = format!("{} ({})", scene.name, path.display());
+                folder.unusable.push(SuiteError::Unsolvable { scene, error }.to_string());
+            }
+        }
+    }
+    match (&folder.cases[..], &folder.unusable[..]) {
+        ([], []) => {
+            let what = kind.map_or(String::new(), |k| format!(" of type {k}"));
+            Err(SuiteError::NoScenes(format!(
+                "{}: holds no scenes{what}; expected .json or .csv scene files",
+                dir.display()
+            )))
+        }
+        ([], [first, ..]) => {
+            let what = kind.map_or(String::new(), |k| format!("no other is of type {k}; "));
+            let complaint = folder.complaint().expect("one is named");
+            Err(SuiteError::NoScenes(format!("{complaint}; {what}the first: {first}")))
+        }
+        _ => Ok(folder),
+    }
 }
 
 /// Checks, before anything runs, that every method can be built and every scene planned.

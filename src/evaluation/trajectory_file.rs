@@ -10,7 +10,7 @@ use std::path::{Path as FilePath, PathBuf};
 use serde::{Serialize, Serializer};
 use serde_json::Value;
 
-use super::export::snap;
+use super::export::{Near, snap};
 use crate::curves::trajectory::{LimitError, Moment, TrajectoryReport};
 use crate::curves::{Path, Trajectory, TrajectoryLimits};
 use crate::files::write_whole;
@@ -64,8 +64,10 @@ impl TrajectoryFile {
         method: &str,
         limits: TrajectoryLimits,
     ) -> Result<Self, LimitError> {
-        let trajectory = Trajectory::new(&path.to_world(frame), &scene.vehicle, &limits)?;
+        let near = Near::new(scene, frame);
+        let trajectory = Trajectory::new(&path.to_world(&near.frame), &scene.vehicle, &limits)?;
         let mut moments = trajectory.sample(Self::STEP);
+        moments.iter_mut().for_each(|m| m.pose = near.to_world(m.pose));
         // The wheels turn at the start before the car moves: several samples are there.
         for moment in moments.iter_mut().take_while(|m| m.distance == 0.0) {
             moment.pose = snap(moment.pose, scene.start);

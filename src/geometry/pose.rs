@@ -72,6 +72,12 @@ impl Pose {
         self.x.is_finite() && self.y.is_finite() && self.heading.is_finite()
     }
 
+    /// How finely `f64` resolves the position, metres: from the larger coordinate to the next number.
+    pub fn resolution(self) -> f64 {
+        let largest = self.x.abs().max(self.y.abs());
+        largest.next_up() - largest
+    }
+
     /// Straight-line distance between the positions, metres.
     pub fn distance(self, other: Pose) -> f64 {
         (self.x - other.x).hypot(self.y - other.y)
@@ -114,6 +120,12 @@ mod tests {
         assert_eq!(wrap_angle(-PI), PI);
         assert!((wrap_angle(3.0 * PI + 0.1) - (-PI + 0.1)).abs() < 1e-12);
         assert!((signed_angle(PI - 0.1, -PI + 0.1) - 0.2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn coordinates_lose_digits_far_away() {
+        assert_eq!(Pose::new(0.0, -(2_f64.powi(39)), 0.0).resolution(), 2_f64.powi(-13));
+        assert!(Pose::new(5e5, 1.0, 0.0).resolution() < 1e-10);
     }
 
     #[test]

@@ -143,12 +143,12 @@ impl Vehicle {
             self.rear_overhang >= 0.0 && self.rear_overhang + self.wheelbase <= self.length,
             "at least 0 metres, and with the wheelbase no more than the length",
         )?;
-        check(
-            "max_steer",
-            self.max_steer,
-            (0.01..1.5).contains(&self.max_steer),
-            "between 0.01 and 1.5 radians",
-        )?;
+        let angles = match self.max_steer {
+            steer if steer > 1.5 => "between 0.01 and 1.5 radians; it looks like degrees",
+            _ => "between 0.01 and 1.5 radians",
+        };
+        let is_angle = (0.01..1.5).contains(&self.max_steer);
+        check("max_steer", self.max_steer, is_angle, angles)?;
         let speeds = "between 0.01 and 50 m/s";
         let is_speed = |v: f64| (0.01..=50.0).contains(&v);
         check("forward_speed", self.forward_speed, is_speed(self.forward_speed), speeds)?;
@@ -281,5 +281,11 @@ mod tests {
         assert_eq!(v.validate().unwrap_err().field, "width");
         let v = Vehicle { rear_overhang: 3.0, ..Vehicle::default() };
         assert_eq!(v.validate().unwrap_err().field, "rear_overhang");
+        let v = Vehicle { max_steer: 35.0, ..Vehicle::default() };
+        let told = "vehicle.max_steer is 35; it must be between 0.01 and 1.5 radians; it looks \
+                    like degrees";
+        assert_eq!(v.validate().unwrap_err().to_string(), told);
+        let v = Vehicle { max_steer: 0.0, ..Vehicle::default() };
+        assert!(!v.validate().unwrap_err().to_string().contains("degrees"));
     }
 }

@@ -6,6 +6,7 @@
 //! The raw benchmark format is in [`tpcap`], the generator in [`generate`](super::generate).
 
 use std::collections::HashSet;
+use std::f64::consts::TAU;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -87,6 +88,9 @@ pub enum SceneError {
     },
 }
 
+/// A scene file, with its scene or why it holds none.
+pub type FileScene = (PathBuf, Result<Scene, SceneError>);
+
 /// A field with a value that no scene can have.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{field} {message}")]
@@ -98,9 +102,16 @@ pub struct InvalidField {
 }
 
 impl Scene {
-    /// Largest |coordinate| of a scene, metres: beyond it `f64` no longer resolves
-    /// what the collision check relies on.
-    pub const MAX_COORDINATE: f64 = 1e7;
+    /// Largest |coordinate| of a scene, metres: 2³⁹, up to which `f64` resolves a tenth of a
+    /// millimetre.
+    pub const MAX_COORDINATE: f64 = (1_u64 << 39) as f64;
+
+    /// How far obstacles and bounds may lie from the start along each axis, metres: beyond it
+    /// `f64` no longer resolves what the collision check relies on.
+    pub const MAX_REACH: f64 = 1e7;
+
+    /// Largest |heading|, radians: beyond it `f64` no longer resolves angles to a few nanoradians.
+    const MAX_HEADING: f64 = 1e7;
 
     /// Largest straight distance between start and goal, metres: paths are sampled and
     /// checked every few centimetres.
@@ -132,13 +143,21 @@ impl Scene {
             scene.name = stem(path);
         }
         scene.validate(path)?;
+        if let Some(warning) = scene.degrees() {
+            tracing::warn!("{}: {warning}", path.display());
+        }
         Ok(scene)
     }
 
     /// Reads every `.json` and `.csv` file of a folder, in the order of their names.
     /// A scene whose name another one has already is called after its file instead, so
-    /// that names are unique.
+    /// that names are unique. Fails with the first file that is no scene.
     pub fn read_dir(dir: &Path) -> Result<Vec<Scene>, SceneError> {
+        Self::read_each(dir)?.into_iter().map(|(_, scene)| scene).collect()
+    }
+
+    /// As [`Scene::read_dir`], but every file is read: each with its scene, or why it holds none.
+    pub fn read_each(dir: &Path) -> Result<Vec<FileScene>, SceneError> {
         let read = |error| SceneError::Read { path: dir.to_owned(), error };
         let mut paths = Vec::new();
         for entry in fs::read_dir(dir).map_err(read)? {
@@ -157,15 +176,18 @@ impl Scene {
         let mut taken = HashSet::new();
         let mut scenes = Vec::with_capacity(paths.len());
         for path in paths {
-            let mut scene = Scene::read(&path)?;
-            if taken.contains(&scene.name) {
-                scene.name = stem(&path);
+            let mut scene = Scene::read(&path);
+            if let Ok(scene) = &mut scene {
+                if taken.contains(&scene.name) {
+                    scene.name = stem(&path);
+                }
+                if taken.contains(&scene.name) {
+                    scene.name =
+                        path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                }
+                taken.insert(scene.name.clone());
             }
-            if taken.contains(&scene.name) {
-                scene.name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            }
-            taken.insert(scene.name.clone());
-            scenes.push(scene);
+            scenes.push((path, scene));
         }
         Ok(scenes)
     }
@@ -207,24 +229,45 @@ impl Scene {
     /// Checks every number: what planners need to be true.
     pub(crate) fn check_numbers(&self) -> Result<(), InvalidField> {
         let invalid = |field: String, message: String| Err(InvalidField { field, message });
-        let numbers = |field: &dyn Fn() -> String, values: &[f64]| {
-            let Some(v) = values.iter().find(|v| v.is_nan() || v.abs() > Self::MAX_COORDINATE)
-            else {
-                return Ok(());
-            };
-            let message = if v.is_finite() {
-                "is too large; coordinates must lie within ±1e7 (subtract the map's offset)"
+        let Pose { x, y, .. } = self.start;
+        // What is wrong with coordinates, in turn x and y, that may lie `reach` from the start.
+        let fault = |values: &[f64], reach: f64| {
+            let is_far = |(i, v): (usize, &f64)| (v - [x, y][i % 2]).abs() > reach;
+            if !values.iter().all(|v| v.is_finite()) {
+                Some("is not finite; every value must be a finite number")
+            } else if values.iter().any(|v| v.abs() > Self::MAX_COORDINATE) {
+                Some(
+                    "is too large: a number no longer tells tenths of a millimetre there; \
+                     coordinates must lie within ±5.4e11 (subtract the map's offset)",
+                )
+            } else if values.iter().enumerate().any(is_far) {
+                Some("is too far from the start; expected at most 1e7 m along each axis")
             } else {
-                "is not finite; every value must be a finite number"
-            };
-            invalid(field(), format!("= {values:?} {message}"))
+                None
+            }
         };
+        let numbers =
+            |field: &dyn Fn() -> String, values: &[f64]| match fault(values, Self::MAX_REACH) {
+                Some(message) => invalid(field(), format!("= {values:?} {message}")),
+                None => Ok(()),
+            };
         if let Err(e) = self.vehicle.validate() {
             let message = format!("is {}; it must be {}", e.value, e.expected);
             return invalid(format!("vehicle.{}", e.field), message);
         }
-        numbers(&|| "start".to_owned(), &<[f64; 3]>::from(self.start))?;
-        numbers(&|| "goal".to_owned(), &<[f64; 3]>::from(self.goal))?;
+        let poses = [("start", self.start), ("goal", self.goal)];
+        for (field, pose) in poses {
+            let heading = match pose.heading.abs() {
+                h if h <= Self::MAX_HEADING => None,
+                h if h.is_finite() => Some("has too large a heading; expected at most 1e7 rad"),
+                _ => Some("is not finite; every value must be a finite number"),
+            };
+            // Their distance has a limit of its own, below.
+            if let Some(message) = fault(&[pose.x, pose.y], f64::INFINITY).or(heading) {
+                let values = <[f64; 3]>::from(pose);
+                return invalid(field.to_owned(), format!("= {values:?} {message}"));
+            }
+        }
         let distance = self.start.distance(self.goal);
         if distance > Self::MAX_DISTANCE {
             let message = format!(
@@ -262,6 +305,22 @@ impl Scene {
             }
         }
         Ok(())
+    }
+
+    /// A warning where headings look like degrees: no scene needs whole turns, and no heading in
+    /// radians is a whole or half number by chance.
+    fn degrees(&self) -> Option<String> {
+        let poses = [("start", self.start.heading), ("goal", self.goal.heading)];
+        let is_suspect = |h: f64| {
+            let halves = 2.0 * h;
+            h.abs() > TAU * 1.0001 && (halves - halves.round()).abs() < 1e-6
+        };
+        let suspects = poses.iter().filter(|(_, h)| is_suspect(*h));
+        let told: Vec<String> = suspects.map(|(field, h)| format!("{field} is {h}")).collect();
+        let what = told.join(", that of ");
+        (!told.is_empty()).then(|| {
+            format!("the heading of {what}; headings are taken as radians (90° is 1.5708)")
+        })
     }
 
     /// The name as part of a file name, where no two names meet: what does not belong there

@@ -19,6 +19,7 @@ use super::episode::Case;
 use super::learning_curve::{self, CurvePoint};
 use super::method::Method;
 use super::metrics;
+use super::quality;
 use super::report::{CURVE_NOTE, NOTES, Provenance};
 use super::rows::Row;
 use super::table::Table;
@@ -39,6 +40,8 @@ struct Page<'a> {
     columns: Vec<tables::Column>,
     levels: Vec<tables::LevelTable>,
     speed_ups: Vec<tables::SpeedLine>,
+    quality: Vec<tables::QualityLine>,
+    quality_note: &'static str,
     speed_plot: Vec<plots::PanelView>,
     time_plot: Vec<plots::PanelView>,
     node_plot: Vec<plots::PanelView>,
@@ -86,6 +89,8 @@ pub fn page(
         columns: tables::COLUMNS.to_vec(),
         levels: tables::levels(&groups, &methods),
         speed_ups: tables::speed_ups(&groups),
+        quality: tables::quality(&quality::summarise(rows)),
+        quality_note: quality::NOTE,
         speed_plot: plots::speed_ups(&groups, &methods).panels(),
         time_plot: plots::times(&groups, &methods, rows).panels(),
         node_plot: plots::nodes(&groups, &methods, rows).panels(),

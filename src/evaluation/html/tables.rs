@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::super::method::Method;
 use super::super::metrics::{Group, Interval, Summary, Totals};
+use super::super::quality::{self, Quality};
 use super::super::rows::Row;
 use super::super::table::{self, PaperRow, figures, kind_name, level_title, numbers};
 use super::family;
@@ -202,6 +203,40 @@ pub fn paper_ratio(paper: &[PaperRow], group: &Group, summary: &Summary) -> Opti
         searches.filter_map(|m| table::printed(paper, group.level, group.kind, m.name()));
     let reference = searches.min_by(|a, b| mean(a).total_cmp(&mean(b)))?;
     (reference != mine).then(|| mean(reference) / mean(mine))
+}
+
+/// A line of the table of quality.
+#[derive(Serialize)]
+pub struct QualityLine {
+    pub level: String,
+    pub kind: String,
+    /// Whether a new level or type begins here.
+    pub first: bool,
+    pub method: String,
+    pub family: &'static str,
+    pub scenes: usize,
+    pub failed: usize,
+    /// Cost over the best: median, P95, worst; changes beyond the fewest: mean, share of more than
+    /// one, most.
+    pub numbers: [String; 6],
+}
+
+/// Every method's paths against the best of the run.
+pub fn quality(found: &Quality) -> Vec<QualityLine> {
+    let mut lines = Vec::new();
+    for (level, kind, methods) in found.parts() {
+        lines.extend(methods.iter().enumerate().map(|(i, m)| QualityLine {
+            level: level.clone(),
+            kind: kind.clone(),
+            first: i == 0,
+            method: m.method.clone(),
+            family: family(&m.method),
+            scenes: m.scenes,
+            failed: m.failed,
+            numbers: quality::numbers(m),
+        }));
+    }
+    lines
 }
 
 /// A failure, and where in the gallery it can be seen.
