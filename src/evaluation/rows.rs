@@ -408,7 +408,7 @@ mod tests {
         let mut writer = RowWriter::create(&path).unwrap();
         writer.push(&row).unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
-        assert!(text.contains("\n\"a\rb\",") && text.ends_with(",\"c\r\"\n"), "{text:?}");
+        assert!(text.contains("\n\"a\rb\",") && text.contains(",\"c\r\","), "{text:?}");
         assert_eq!(read_csv(&path).unwrap(), [row]);
     }
 
