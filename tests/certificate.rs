@@ -160,12 +160,7 @@ fn verdicts(rng: &mut impl Rng, most_turn: f64) -> Option<(bool, Result<f64, ora
     let (obstacles, points) =
         if corners.len() == 1 { (vec![], corners) } else { (vec![corners], vec![]) };
     let path = Path::new(start, [segment]);
-    let scene = Scene {
-        vehicle,
-        start,
-        goal: path.end(),
-        ..ahead(obstacles, points)
-    };
+    let scene = Scene { vehicle, start, goal: path.end(), ..ahead(obstacles, points) };
     let world = CollisionWorld::new(&scene.geometry().unwrap(), None, &vehicle, 0.0);
     let grown = CollisionWorld::new(&scene.geometry().unwrap(), None, &vehicle, 1e-3 * length);
     // Starts that graze are for another test.

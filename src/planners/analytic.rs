@@ -37,6 +37,9 @@ impl AnalyticTail {
 /// Multiples of the entry step that settings within their ranges can ask for.
 const MOST_STRAIGHTS: u32 = 1001;
 
+/// What a curve with a motion too short to drive counts as more, in changes of gear.
+const TINY_MOTION: f64 = 2.0;
+
 /// A goal pose, and the poses from which the rest of the way into it is known.
 #[derive(Clone, Debug)]
 pub(crate) struct GoalSet {
@@ -294,8 +297,13 @@ impl AnalyticExpansion {
     ) {
         let first = self.words.len();
         reeds_shepp::words(curves.from, to, curves.radius, &mut self.words);
+        let least = CostModel::shortest_motion(curves.vehicle);
         for (word, w) in (first as u32..).zip(&self.words[first..]) {
-            let (curve, arrival) = curve_cost(w, DriveState::PARKED, curves.vehicle, curves.model);
+            let (mut curve, arrival) =
+                curve_cost(w, DriveState::PARKED, curves.vehicle, curves.model);
+            if w.shortest_segment() < least {
+                curve += TINY_MOTION * curves.model.gear_change;
+            }
             if let Some(cost) = cost(curve + curves.model.change(arrival, departure)) {
                 self.candidates.push(Candidate { cost, target, word });
             }

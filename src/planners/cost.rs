@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::curves::Segment;
 use crate::vehicle::{Gear, Vehicle};
 
-/// Weights of the cost terms.
+/// Weights of the cost terms, those of changes for the default vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CostModel {
@@ -61,12 +61,25 @@ impl CostModel {
         Ok(())
     }
 
+    /// The weights for a vehicle `scale` times as long as the default one: what a change is
+    /// worth is counted in metres, too.
+    pub fn scaled(&self, scale: f64) -> Self {
+        let (gear_change, steer_change) = (self.gear_change * scale, self.steer_change * scale);
+        Self { gear_change, steer_change, ..*self }
+    }
+
     /// Cost per metre in `gear`, without steering.
     pub fn per_metre(&self, gear: Gear) -> f64 {
         match gear {
             Gear::Forward => self.forward,
             Gear::Backward => self.backward,
         }
+    }
+
+    /// Motions shorter than this are not worth driving, metres: what costs less than that is to be
+    /// reached otherwise where it can be.
+    pub fn shortest_motion(vehicle: &Vehicle) -> f64 {
+        0.01 * vehicle.scale()
     }
 
     /// Cost of changing gear and steering between two motions.

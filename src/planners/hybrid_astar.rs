@@ -12,10 +12,12 @@
 
 use crate::curves::{Path, Segment};
 use crate::geometry::Pose;
+use crate::vehicle::Vehicle;
 
 use super::analytic::{AnalyticExpansion, AnalyticTail};
 pub(crate) use super::analytic::{Connection, Entry, GoalSet};
-use super::config::{HybridAStarConfig, Resolution};
+use super::config::{Attempt, HybridAStarConfig};
+use super::cost::CostModel;
 use super::multi_heuristic::Guides;
 use super::search::Search;
 use super::{Budget, NoPath, PlanResult, Planner, Problem};
@@ -66,7 +68,12 @@ impl HybridAStar {
 
     /// The goal of `problem` with the entry straights that are free.
     pub(crate) fn goal_set(&self, problem: &Problem) -> GoalSet {
-        self.config.goal_set(problem)
+        self.config.for_vehicle(&problem.vehicle).goal_set(problem)
+    }
+
+    /// The cost of driving `vehicle`.
+    pub(crate) fn cost(&self, vehicle: &Vehicle) -> CostModel {
+        self.config.cost.scaled(vehicle.scale())
     }
 
     /// [`HybridAStar::goal_set`] that also has the entries of a cell whose goal lies `shift`
@@ -74,7 +81,7 @@ impl HybridAStar {
     pub(crate) fn goal_set_of_cell(&self, problem: &Problem, shift: f64) -> GoalSet {
         let mut goal = self.goal_set(problem);
         if shift > 0.0 {
-            self.config.add_straights(problem, shift, &mut goal);
+            self.config.for_vehicle(&problem.vehicle).add_straights(problem, shift, &mut goal);
         }
         goal
     }
@@ -86,7 +93,12 @@ impl HybridAStar {
         from: Pose,
         goal: &'a GoalSet,
     ) -> Option<Connection<'a>> {
-        self.analytic.connect(from, goal, problem, &self.config.cost)
+        self.analytic.connect(
+            from,
+            goal,
+            problem,
+            &self.config.cost.scaled(problem.vehicle.scale()),
+        )
     }
 
     /// Searches from `start` to `goal` within `expansions`, which is reduced by what was
@@ -121,9 +133,10 @@ impl HybridAStar {
         expansions: &mut usize,
     ) -> Result<Leg, NoPath> {
         let mut best = direct;
-        let config = self.config;
-        let result = config.coarse_to_fine(expansions, |resolution, expansions| {
-            let result = self.search_leg(resolution, problem, start, goal, &mut best, expansions);
+        let config = self.config.for_search(&problem.vehicle)?;
+        let domains = config.domains(problem, start, goal.pose);
+        let result = config.coarse_to_fine(&domains, expansions, |attempt, expansions| {
+            let result = self.search_leg(attempt, problem, start, goal, &mut best, expansions);
             if best.is_some() { Ok(()) } else { result }
         });
         result.map(|()| best.expect("a search that succeeds leaves a leg"))
@@ -132,7 +145,7 @@ impl HybridAStar {
     /// One search at one resolution, for something cheaper than `best`.
     fn search_leg(
         &mut self,
-        resolution: &Resolution,
+        attempt: Attempt,
         problem: &Problem,
         start: Pose,
         goal: &GoalSet,
@@ -140,8 +153,8 @@ impl HybridAStar {
         expansions: &mut usize,
     ) -> Result<(), NoPath> {
         let mut wanted = self.solutions - usize::from(best.is_some());
-        let domain = self.config.domain(problem, start, goal.pose);
-        self.queue.begin(&self.config, resolution, problem, domain, start, goal);
+        let config = attempt.config;
+        self.queue.begin(attempt, problem, start, goal);
         while let Some(node) = self.queue.pop() {
             let bound = best.as_ref().map_or(f64::INFINITY, |leg| leg.cost);
             if self.queue.estimate(node) >= bound {
@@ -153,7 +166,7 @@ impl HybridAStar {
             *expansions -= 1;
             if self.queue.wants_curve(node) {
                 let departure = self.queue.departure(node, goal);
-                let (to, model) = (self.queue.pose(node), &self.config.cost);
+                let (to, model) = (self.queue.pose(node), &config.cost);
                 let way_cost = self.queue.cost(node);
                 let bound = bound - way_cost;
                 let curve = self.analytic.curve(start, to, departure, bound, problem, model);
@@ -169,7 +182,7 @@ impl HybridAStar {
                     }
                 }
             }
-            self.queue.expand(node, goal, &self.config, problem);
+            self.queue.expand(node, goal, config, problem);
         }
         Err(self.queue.stop())
     }
@@ -212,7 +225,7 @@ impl HybridAStar {
             };
             let mut whole = leg.path;
             whole.extend(tail.segments());
-            let cost = self.config.cost.path(&problem.vehicle, &whole.segments);
+            let cost = self.cost(&problem.vehicle).path(&problem.vehicle, &whole.segments);
             if two_curves.is_none_or(|(best, _)| cost < best - EQUAL) {
                 two_curves = Some((cost, tail));
             }
@@ -224,7 +237,7 @@ impl HybridAStar {
     /// the path's curvature or gear changes, that one curve from the start joins at the least
     /// cost. What lies before it is replaceable by that curve from starts nearby as well.
     pub fn manoeuvre(&mut self, problem: &Problem, path: &Path) -> Option<Vec<Segment>> {
-        let cost = self.config.cost;
+        let cost = self.cost(&problem.vehicle);
         let mut best: Option<(f64, usize)> = None;
         for (i, (pose, _)) in path.legs().enumerate() {
             let Some(mut leg) = self.direct(problem, path.start, &GoalSet::single(pose)) else {

@@ -139,7 +139,7 @@ impl GuidedPlanner {
     /// joined, one curve straight to the goal is asked for, too, and the cheaper plan taken.
     fn look_up(&mut self, problem: &Problem) -> Attempt {
         let Self { libraries, library_search, verdicts, hars, .. } = self;
-        let cost = hars.config().cost;
+        let cost = hars.cost(&problem.vehicle);
         verdicts.clear();
         let any = f64::INFINITY;
         let mut look_up = library_search.look_up(&libraries[0].1, verdicts, problem, &cost, any);
@@ -170,8 +170,8 @@ impl GuidedPlanner {
             None => {
                 let (vehicle, footprint) = (&problem.vehicle, *problem.collision.footprint());
                 let manoeuvres = self.selector.manoeuvres(kind, vehicle);
-                let cost = &self.hars.config().cost;
-                let library = Library::new(&manoeuvres, vehicle, footprint, cost);
+                let cost = self.hars.cost(vehicle);
+                let library = Library::new(&manoeuvres, vehicle, footprint, &cost);
                 self.libraries.truncate(LIBRARIES - 1);
                 self.libraries.insert(0, (kind, library));
             }
@@ -233,7 +233,7 @@ impl GuidedPlanner {
             for i in 0..self.poses.len() {
                 let pose = self.poses[i];
                 if let Some((pose, rest)) = self.feasible(problem, pose, &of_cell) {
-                    let cost = self.hars.config().cost;
+                    let cost = self.hars.cost(&problem.vehicle);
                     goal.add_preparatory(pose, rest, &problem.vehicle, &cost);
                 }
             }
@@ -280,7 +280,8 @@ impl GuidedPlanner {
             (-0.4, 0.0, 0.0),
         ];
         NUDGES.iter().find_map(|&(along, across, turn)| {
-            let p = pose.point_to_parent(Vec2::new(along, across));
+            let scale = problem.vehicle.scale();
+            let p = pose.point_to_parent(Vec2::new(along, across) * scale);
             let nudged = Pose::new(p.x, p.y, pose.heading + turn);
             if !problem.collision.pose_is_free(nudged) {
                 return None;
