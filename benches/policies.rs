@@ -69,7 +69,8 @@ impl Side {
 
 fn bench(c: &mut Criterion) {
     // As every program does that drives or trains policies.
-    n3p::training::single_threaded();
+    // SAFETY: the only benchmark of this program, and criterion has started no thread.
+    unsafe { n3p::training::single_threaded() };
     let mut rng = rng(common::SEED, Stream::Policy, 0);
     let mut group = c.benchmark_group("environment");
     group.throughput(Throughput::Elements(ENVIRONMENTS));

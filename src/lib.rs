@@ -9,8 +9,7 @@
 //! shows the three together on one page. Metres, radians, counter-clockwise; a pose is that of
 //! the rear-axle centre.
 //!
-//! The modules in reading order; each uses those above it, never one below (but [`cli`], whose
-//! progress bar serves long tasks everywhere).
+//! The modules in reading order; each uses those above it, never one below.
 //!
 //! - [`rng`]: one seed, many named random streams
 //! - [`files`]: files that are whole or absent, and plain words for what fails

@@ -1,5 +1,8 @@
 //! A scene may lie anywhere: shifted, turned or mirrored it is planned the same way.
 
+#[path = "fixtures/lots.rs"]
+mod lots;
+
 use std::path::Path;
 
 use n3p::evaluation::{Method, MethodSettings, Models, PathFile, oracle};
@@ -104,20 +107,19 @@ fn scenes_without_a_parking_type_are_understood_the_same_anywhere() {
     check(&generated(3, false), &[Method::N3p], &models);
 }
 
-#[test]
-fn real_lots_are_planned_the_same_anywhere() {
-    let Some(folder) = ["../shared/scenes/tpcap", "../shared/scenes/dlp"]
-        .map(Path::new)
-        .into_iter()
-        .find(|f| f.exists())
-    else {
-        eprintln!("no real scenes here: skipped");
-        return;
-    };
+fn check_lots(scenes: &[Scene]) {
     let models = Models::usual(&[Method::N3p], None).unwrap();
-    let scenes: Vec<Scene> = [folder, &folder.with_file_name("dlp")]
-        .iter()
-        .flat_map(|f| Scene::read_dir(f).unwrap().into_iter().take(15))
-        .collect();
-    check(&scenes, &[Method::N3p], &models);
+    check(scenes, &[Method::N3p], &models);
+}
+
+#[test]
+fn hand_made_lots_are_planned_the_same_anywhere() {
+    check_lots(&Scene::read_dir(Path::new("tests/fixtures/lots")).unwrap());
+}
+
+#[test]
+#[ignore = "needs ../shared/scenes"]
+fn real_lots_are_planned_the_same_anywhere() {
+    check_lots(&lots::real("tpcap")[..10]);
+    check_lots(&lots::real("dlp")[..15]);
 }

@@ -345,3 +345,22 @@ fn wrong_arguments_are_told_in_two_lines() {
         assert!(stderr.trim().lines().count() <= 2, "more than two lines: {stderr}");
     }
 }
+
+/// Every worker starts the policy's program for itself. Here the files that one process may open
+/// do not suffice for all of them, though they did for the checks before.
+#[test]
+fn a_policy_that_starts_for_some_workers_only_is_told_and_is_no_bug() {
+    let dir = tempfile::tempdir().unwrap();
+    let program = assert_cmd::cargo::cargo_bin("n3p-eval");
+    let few_files = format!("ulimit -n 48; exec '{}' \"$@\"", program.display());
+    let assert = Command::new("sh")
+        .current_dir(dir.path())
+        .args(["-c", &few_files, "n3p-eval", "--policy", "sh -c 'cat >/dev/null'"])
+        .args(["--methods", "policy", "--count", "20", "--threads", "64"])
+        .assert()
+        .code(2)
+        .stdout("");
+    let stderr = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+    assert!(stderr.contains("Too many open files"), "{stderr}");
+    assert!(!stderr.contains("panicked"), "{stderr}");
+}

@@ -135,20 +135,14 @@ fn settings_decide_what_is_tried_before_a_search() {
     );
 }
 
-/// In real lots the known manoeuvres do not always do; then the curve straight to the goal is taken
-/// where it is free, as `ha-rs` takes it.
-#[test]
-fn where_known_manoeuvres_cannot_be_joined_the_curve_to_the_goal_serves() {
-    let lot = std::path::Path::new("../shared/scenes/dlp");
-    if !lot.exists() {
-        eprintln!("no real scenes here: skipped");
-        return;
-    }
-    let models = Models::load(&["models/knn-tpcap.bin"]).unwrap();
+/// The known manoeuvres do not always do; then the curve straight to the goal is taken where it is
+/// free, as `ha-rs` takes it. Some scene of the folder is of that kind.
+fn check_curves_to_the_goal(folder: &str) {
+    let models = Models::usual(&[Method::N3p], None).unwrap();
     let [mut n3p, mut hars] =
         [Method::N3p, Method::HaRs].map(|m| m.build(&models, &MethodSettings::default()).unwrap());
     let mut direct = 0;
-    for scene in Scene::read_dir(lot).unwrap() {
+    for scene in Scene::read_dir(folder.as_ref()).unwrap() {
         let problem = Problem::new(&scene).unwrap();
         let budget = Budget { max_expansions: 200_000 };
         let ours = n3p.plan(&problem, budget);
@@ -163,4 +157,15 @@ fn where_known_manoeuvres_cannot_be_joined_the_curve_to_the_goal_serves() {
         }
     }
     assert!(direct > 0);
+}
+
+#[test]
+fn where_known_manoeuvres_cannot_be_joined_the_curve_to_the_goal_serves() {
+    check_curves_to_the_goal("tests/fixtures/lots");
+}
+
+#[test]
+#[ignore = "needs ../shared/scenes"]
+fn where_known_manoeuvres_cannot_be_joined_in_real_lots_the_curve_to_the_goal_serves() {
+    check_curves_to_the_goal("../shared/scenes/dlp");
 }

@@ -165,6 +165,12 @@ fn rejects_jumps_gaps_and_wrong_gears() {
     let mut nan = good.clone();
     nan.poses[7][2] = f64::NAN;
     assert_eq!(oracle::check(&scene, &nan), Err(Violation::NotANumber { pose: 7 }));
+    // The least number of eight bits has no absolute value.
+    for gear in [0, 2, -2, i8::MIN, i8::MAX] {
+        let mut wrong = good.clone();
+        wrong.gears[3] = gear;
+        assert_eq!(oracle::check(&scene, &wrong), Err(Violation::NotANumber { pose: 3 }), "{gear}");
+    }
     let mut short = good;
     short.steer.pop();
     assert!(matches!(oracle::check(&scene, &short), Err(Violation::Shape { .. })));

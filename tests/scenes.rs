@@ -1,5 +1,8 @@
 //! Scene files: what is read, and what a person is told about a file that is not a scene.
 
+#[path = "fixtures/lots.rs"]
+mod lots;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -221,17 +224,30 @@ proptest! {
     }
 }
 
-/// The scenes beside the repository, when they are there.
-fn shared(folder: &str) -> Option<PathBuf> {
-    let path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/scenes")).join(folder);
-    path.is_dir().then_some(path)
+#[test]
+fn a_tpcap_file_written_as_json_is_the_same_scene() {
+    let dir = tempfile::tempdir().unwrap();
+    for name in ["yard", "narrow", "ahead"] {
+        let raw = Scene::read(&hand_made().join(format!("{name}.csv"))).unwrap();
+        assert_eq!(raw.name, name);
+        let json = dir.path().join(format!("{name}.json"));
+        raw.write(&json).unwrap();
+        assert_eq!(Scene::read(&json).unwrap(), raw);
+    }
+}
+
+/// Parking lots made by hand for the tests.
+fn hand_made() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/lots")
 }
 
 #[test]
+#[ignore = "needs ../shared/scenes"]
 fn raw_tpcap_files_are_the_benchmark_scenes() {
     // The reference files are rounded to nanometres.
     const TOL: f64 = 1e-9;
-    let (Some(raw), Some(reference)) = (shared("tpcap-csv"), shared("tpcap")) else { return };
+    let shared = Path::new("../shared/scenes");
+    let (raw, reference) = (shared.join("tpcap-csv"), shared.join("tpcap"));
     for i in 1..=10 {
         let a = Scene::read(&raw.join(format!("Case{i}.csv"))).unwrap();
         let b = Scene::read(&reference.join(format!("tpcap-case{i:02}.json"))).unwrap();
@@ -248,21 +264,30 @@ fn raw_tpcap_files_are_the_benchmark_scenes() {
     }
 }
 
-#[test]
-fn real_scenes_read_with_free_starts_and_goals() {
-    for folder in ["tpcap", "dlp"] {
-        let Some(dir) = shared(folder) else { return };
-        for scene in Scene::read_dir(&dir).unwrap() {
-            let obstacles = scene.geometry().unwrap();
-            let polygons = obstacles.polygons();
-            assert_eq!(polygons.len(), scene.obstacles.len());
-            for pose in [scene.start, scene.goal] {
-                let car = scene.vehicle.footprint_at(pose);
-                let inside = |p: &Polygon, q: &Polygon| q.vertices().iter().any(|&v| p.contains(v));
-                let hit = polygons.iter().any(|p| inside(p, &car) || inside(&car, p));
-                assert!(!hit, "{}: footprint at {pose:?}", scene.name);
-                assert!(Vec2::new(pose.x, pose.y).norm().is_finite());
-            }
+/// Every scene was read whole, and the car stands free at start and goal.
+fn check_free_ends(scenes: &[Scene]) {
+    for scene in scenes {
+        let obstacles = scene.geometry().unwrap();
+        let polygons = obstacles.polygons();
+        assert_eq!(polygons.len(), scene.obstacles.len());
+        for pose in [scene.start, scene.goal] {
+            let car = scene.vehicle.footprint_at(pose);
+            let inside = |p: &Polygon, q: &Polygon| q.vertices().iter().any(|&v| p.contains(v));
+            let hit = polygons.iter().any(|p| inside(p, &car) || inside(&car, p));
+            assert!(!hit, "{}: footprint at {pose:?}", scene.name);
+            assert!(Vec2::new(pose.x, pose.y).norm().is_finite());
         }
     }
+}
+
+#[test]
+fn hand_made_scenes_read_with_free_starts_and_goals() {
+    check_free_ends(&Scene::read_dir(&hand_made()).unwrap());
+}
+
+#[test]
+#[ignore = "needs ../shared/scenes"]
+fn real_scenes_read_with_free_starts_and_goals() {
+    check_free_ends(&lots::real("tpcap"));
+    check_free_ends(&lots::real("dlp"));
 }

@@ -8,7 +8,7 @@ use anyhow::Result;
 use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::evaluation::report::{self, Provenance};
-use n3p::evaluation::suite::{self, SuiteConfig};
+use n3p::evaluation::suite::{self, SuiteConfig, SuiteError};
 use n3p::evaluation::{Case, Method, MethodSettings, Models, Outputs, metrics};
 use n3p::progress;
 use n3p::rl::source::PolicySource;
@@ -76,7 +76,8 @@ struct Args {
 }
 
 fn main() -> ExitCode {
-    training::single_threaded();
+    // SAFETY: the first statement of the program, which has started no thread.
+    unsafe { training::single_threaded() };
     cli::run(|| evaluate(&cli::parse()))
 }
 
@@ -122,6 +123,11 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
         bar.set_message(format!("{} {}", episode.row.method, episode.row.scene));
         bar.inc(1);
         outputs.take(case, episode, &models).map_err(anyhow::Error::from)
+    });
+    // As in the checks before: a suite that cannot run is the user's to mend, a full disk is not.
+    let rows = rows.map_err(|error| match error.downcast::<SuiteError>() {
+        Ok(suite) => BadInput(suite.to_string()).into(),
+        Err(other) => other,
     })?;
     bar.finish_and_clear();
     if !narrow.is_empty() {

@@ -83,7 +83,8 @@ impl From<&GivenArgs> for Given {
 const SHOWN: usize = 20;
 
 fn main() -> ExitCode {
-    training::single_threaded();
+    // SAFETY: the first statement of the program, which has started no thread.
+    unsafe { training::single_threaded() };
     let args = cli::parse::<Cli>();
     cli::run(|| match &args.command {
         Command::Run { file, out, given } => run(file, out.as_deref(), given),

@@ -107,7 +107,8 @@ impl Limits {
 }
 
 fn main() -> ExitCode {
-    training::single_threaded();
+    // SAFETY: the first statement of the program, which has started no thread.
+    unsafe { training::single_threaded() };
     cli::run(|| plan(&cli::parse()))
 }
 

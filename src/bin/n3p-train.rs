@@ -129,7 +129,8 @@ enum DeviceName {
 }
 
 fn main() -> ExitCode {
-    training::single_threaded();
+    // SAFETY: the first statement of the program, which has started no thread.
+    unsafe { training::single_threaded() };
     let cli = cli::parse::<Cli>();
     cli::run(|| match &cli.command {
         Command::Mlp(args) => mlp(args),

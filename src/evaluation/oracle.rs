@@ -338,7 +338,7 @@ impl Oracle {
         }
         for i in 0..n {
             let finite = path.poses[i].iter().all(|v| v.is_finite()) && path.steer[i].is_finite();
-            if !finite || path.gears[i].abs() != 1 {
+            if !finite || !matches!(path.gears[i], 1 | -1) {
                 return Err(Violation::NotANumber { pose: i });
             }
         }

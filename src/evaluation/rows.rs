@@ -285,7 +285,7 @@ pub fn write_parquet(path: &Path, rows: &[Row]) -> Result<(), RowsError> {
 }
 
 fn quoted(field: &str) -> String {
-    if field.contains([',', '"', '\n']) {
+    if field.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", field.replace('"', "\"\"").replace('\n', " "))
     } else {
         field.to_owned()
@@ -348,6 +348,19 @@ mod tests {
         let bytes = std::fs::read(&path).unwrap();
         std::fs::write(&path, &bytes[..bytes.len() - 5]).unwrap();
         assert_eq!(read_csv(&path).unwrap(), vec![row()]);
+    }
+
+    /// Other readers take a carriage return outside quotes for the end of a row.
+    #[test]
+    fn carriage_returns_are_quoted_and_read_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("rows.csv");
+        let row = Row { scene: "a\rb".into(), route: "c\r".into(), ..row() };
+        let mut writer = RowWriter::create(&path).unwrap();
+        writer.push(&row).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains("\n\"a\rb\",") && text.ends_with(",\"c\r\"\n"), "{text:?}");
+        assert_eq!(read_csv(&path).unwrap(), [row]);
     }
 
     #[test]

@@ -156,15 +156,18 @@ where
     E: From<SuiteError>,
 {
     check(cases, models, config)?;
+    // Here and not in the workers: what was built for the check can fail the next time, such as a
+    // program that is started anew.
+    let planners = (0..config.threads.max(1)).map(|_| config.build_all(models));
+    let planners: Vec<_> = planners.collect::<Result<_, _>>().map_err(SuiteError::from)?;
     let per_case = config.methods.len();
     let total = cases.len() * per_case;
     let next = AtomicUsize::new(skip);
     let (send, receive) = mpsc::channel();
     std::thread::scope(|scope| {
-        for _ in 0..config.threads.max(1) {
+        for mut planners in planners {
             let (send, next) = (send.clone(), &next);
             scope.spawn(move || {
-                let mut planners = config.build_all(models).expect("checked above");
                 let usual = EpisodeConfig::new(config.max_expansions);
                 let episodes = EpisodeConfig { margin_m: config.margin_m, ..usual };
                 loop {

@@ -4,7 +4,6 @@
 //! [`PolicyHeader`] as [`crate::selectors::tensor_file`] says.
 
 use std::collections::BTreeMap;
-use std::io::Read;
 use std::path::Path;
 
 use candle_core::Device;
@@ -61,8 +60,7 @@ pub fn encode(header: &PolicyHeader, actor: &BTreeMap<String, Vec<f32>>) -> Vec<
 
 /// Reads and checks a policy.
 pub fn load(path: &Path) -> Result<(PolicyHeader, Actor), ArtefactError> {
-    let mut bytes = Vec::new();
-    artefact::open(path)?.read_to_end(&mut bytes).map_err(|e| Fault::Unreadable(e).of(path))?;
+    let bytes = artefact::read(path)?;
     decode(&bytes).map_err(|fault| fault.of(path))
 }
 

@@ -298,6 +298,16 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), ArtefactError> {
         .map_err(|e| Fault::Unwritable(e).of(path))
 }
 
+/// The bytes of a model file.
+pub(crate) fn read(path: &Path) -> Result<Vec<u8>, ArtefactError> {
+    let mut file = open(path)?;
+    // Of the right size at once, where it is known.
+    let size = file.metadata().map_or(0, |m| m.len());
+    let mut bytes = Vec::with_capacity(usize::try_from(size).unwrap_or(0));
+    file.read_to_end(&mut bytes).map_err(|e| Fault::Unreadable(e).of(path))?;
+    Ok(bytes)
+}
+
 /// Opens a model file, refusing missing ones.
 pub(crate) fn open(path: &Path) -> Result<File, ArtefactError> {
     File::open(path).map_err(|e| match e.kind() {

@@ -84,7 +84,7 @@ impl KnnSelector {
         self.file.path()
     }
 
-    /// The mapped file: header and stored samples.
+    /// The file: header and stored samples.
     pub fn file(&self) -> &KnnFile {
         &self.file
     }

@@ -1,6 +1,6 @@
 //! The file format `knn.bin`, version 3.
 //!
-//! All numbers are little-endian. Nothing needs alignment, so the file is used as mapped.
+//! All numbers are little-endian. Nothing needs alignment, so the bytes are used as they lie.
 //!
 //! | bytes | content |
 //! |---|---|
@@ -25,11 +25,9 @@
 //! sample takes 15 bytes.
 
 use std::f64::consts::PI;
-use std::fs::File;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use memmap2::Mmap;
 use serde::{Deserialize, Serialize};
 
 use super::artefact::{self, ArtefactError, Fault};
@@ -153,10 +151,10 @@ pub fn encode(header: &KnnHeader, entries: &[KnnEntries]) -> Vec<u8> {
     bytes
 }
 
-/// A mapped and checked `knn.bin`.
+/// A checked `knn.bin`, in memory.
 #[derive(Debug)]
 pub struct KnnFile {
-    map: Mmap,
+    bytes: Vec<u8>,
     path: PathBuf,
     header: Box<KnnHeader>,
     sections: Vec<Section>,
@@ -173,14 +171,12 @@ struct Section {
 }
 
 impl KnnFile {
-    /// Maps and checks a file.
-    ///
-    /// The mapping stays valid when the file is replaced, as this program does (by
-    /// renaming); a file that another program truncates in place ends the process.
+    /// Reads and checks a file. The checksum reads every byte anyway, and what is in memory stays
+    /// as it was checked, whatever becomes of the file.
     pub fn open(path: &Path) -> Result<Self, ArtefactError> {
-        let map = map(&artefact::open(path)?).map_err(|e| Fault::Unreadable(e).of(path))?;
-        let (header, sections) = check(&map).map_err(|fault| fault.of(path))?;
-        Ok(Self { map, path: path.to_owned(), header: Box::new(header), sections })
+        let bytes = artefact::read(path)?;
+        let (header, sections) = check(&bytes).map_err(|fault| fault.of(path))?;
+        Ok(Self { bytes, path: path.to_owned(), header: Box::new(header), sections })
     }
 
     /// The file's header.
@@ -196,13 +192,13 @@ impl KnnFile {
     /// The samples of a cell. `kind` is a position in [`KnnHeader::kinds`].
     pub fn samples(&self, kind: usize, cell: usize) -> Range<usize> {
         let at = self.sections[kind].offsets + 4 * cell;
-        u32_at(&self.map, at) as usize..u32_at(&self.map, at + 4) as usize
+        u32_at(&self.bytes, at) as usize..u32_at(&self.bytes, at + 4) as usize
     }
 
     /// The start of a sample, spot frame.
     pub fn start(&self, kind: usize, sample: usize) -> Pose {
         let at = self.sections[kind].starts + START_BYTES * sample;
-        let bytes = &self.map[at..at + START_BYTES];
+        let bytes = &self.bytes[at..at + START_BYTES];
         let v = [0, 2, 4].map(|i| i32::from(i16::from_le_bytes([bytes[i], bytes[i + 1]])));
         pose(v, self.header.extent, START_STEPS)
     }
@@ -210,7 +206,7 @@ impl KnnFile {
     /// The preparatory pose of a sample, spot frame.
     pub fn preparatory(&self, kind: usize, sample: usize) -> Pose {
         let at = self.sections[kind].poses + POSE_BYTES * sample;
-        let bytes = &self.map[at..at + POSE_BYTES];
+        let bytes = &self.bytes[at..at + POSE_BYTES];
         // The sign sits in the third byte: place the three above an empty one and shift.
         let v =
             [0, 3, 6].map(|i| i32::from_le_bytes([0, bytes[i], bytes[i + 1], bytes[i + 2]]) >> 8);
@@ -220,22 +216,16 @@ impl KnnFile {
     /// The motions of a manoeuvre, in driving order; they end at the goal.
     pub fn segments(&self, kind: usize, manoeuvre: usize) -> impl Iterator<Item = Segment> + '_ {
         let section = &self.sections[kind];
-        let begin = |i: usize| u32_at(&self.map, section.segment_begins + 4 * i) as usize;
+        let begin = |i: usize| u32_at(&self.bytes, section.segment_begins + 4 * i) as usize;
         (begin(manoeuvre)..begin(manoeuvre + 1)).map(|i| {
             let at = section.segments + SEGMENT_BYTES * i;
-            Segment { curvature: f32_at(&self.map, at), length: f32_at(&self.map, at + 4) }
+            Segment { curvature: f32_at(&self.bytes, at), length: f32_at(&self.bytes, at + 4) }
         })
     }
 }
 
 fn f32_at(bytes: &[u8], at: usize) -> f64 {
     f64::from(f32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes")))
-}
-
-fn map(file: &File) -> std::io::Result<Mmap> {
-    // SAFETY: models are only ever replaced by renaming, never changed in place, so the
-    // mapped bytes stay as they were checked.
-    unsafe { Mmap::map(file) }
 }
 
 fn check(bytes: &[u8]) -> Result<(KnnHeader, Vec<Section>), Fault> {
@@ -351,6 +341,25 @@ mod tests {
             assert!(signed_angle(fine.heading, p.heading).abs() < 2e-7, "{p:?} {fine:?}");
             let coarse = pose(steps(p, 16.0, START_STEPS), 16.0, START_STEPS);
             assert!(coarse.distance(p) < 4e-4, "{p:?} {coarse:?}");
+        }
+    }
+
+    /// Whoever changes the file later, by renaming or in place, changes nothing here.
+    #[test]
+    fn a_file_that_is_cut_off_after_it_was_opened_stays_as_it_was() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("knn.bin");
+        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/knn.bin");
+        std::fs::copy(&shipped, &path).unwrap();
+        let (file, expected) = (KnnFile::open(&path).unwrap(), KnnFile::open(&shipped).unwrap());
+        std::fs::OpenOptions::new().write(true).open(&path).unwrap().set_len(0).unwrap();
+        for (kind, k) in expected.header().kinds.iter().enumerate() {
+            let last = k.samples - 1;
+            assert_eq!(file.samples(kind, 0), expected.samples(kind, 0));
+            assert_eq!(file.start(kind, last), expected.start(kind, last));
+            assert_eq!(file.preparatory(kind, last), expected.preparatory(kind, last));
+            let same = file.segments(kind, 0).eq(expected.segments(kind, 0));
+            assert!(same, "{}", k.kind);
         }
     }
 }

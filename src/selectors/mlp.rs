@@ -6,7 +6,6 @@
 //!
 //! Read next: [`super::network`] for the evaluation.
 
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -80,8 +79,7 @@ pub struct MlpSelector {
 impl MlpSelector {
     /// Reads and checks one network.
     pub fn load(path: &Path) -> Result<Self, ArtefactError> {
-        let mut bytes = Vec::new();
-        artefact::open(path)?.read_to_end(&mut bytes).map_err(|e| Fault::Unreadable(e).of(path))?;
+        let bytes = artefact::read(path)?;
         let (header, weights) = decode(&bytes).map_err(|fault| fault.of(path))?;
         let network = Network::new(Features::COUNT, &weights);
         Ok(Self { networks: vec![Trained { path: path.to_owned(), header, network }] })

@@ -130,22 +130,22 @@ fn metadata(bytes: &[u8]) -> Result<(usize, String), Fault> {
     if data_at > got {
         return Err(Fault::Length { expected: data_at, got });
     }
+    // Before safetensors adds the same numbers, which it does without a check.
+    let tensors = data_len(&bytes[LENGTH..data_at as usize]);
+    let Some(expected) = data_at.checked_add(tensors) else {
+        return Err(Fault::Header(format!(
+            "its tensors take {tensors} bytes, more than a file can"
+        )));
+    };
     match SafeTensors::read_metadata(bytes) {
         Ok((_, metadata)) => {
-            let expected = data_at + metadata.data_len() as u64;
-            if expected != got {
-                return Err(Fault::Length { expected, got });
-            }
             let entry = metadata.metadata().as_ref().and_then(|m| m.get(METADATA_KEY));
             Ok((data_at as usize, entry.ok_or(Fault::NotAModel)?.clone()))
         }
-        Err(SafeTensorError::MetadataIncompleteBuffer) => {
-            let expected = data_at + data_len(&bytes[LENGTH..data_at as usize]);
-            if expected == got {
-                return Err(Fault::Header("the tensors do not fill the file".to_owned()));
-            }
-            Err(Fault::Length { expected, got })
+        Err(SafeTensorError::MetadataIncompleteBuffer) if expected == got => {
+            Err(Fault::Header("the tensors do not fill the file".to_owned()))
         }
+        Err(SafeTensorError::MetadataIncompleteBuffer) => Err(Fault::Length { expected, got }),
         Err(e) => Err(Fault::Header(e.to_string())),
     }
 }
@@ -210,5 +210,37 @@ pub fn f32s(file: &SafeTensors, name: &str, shape: &[usize]) -> Result<Vec<f32>,
     match values.iter().find(|v| !v.is_finite()) {
         Some(&value) => Err(Fault::NotFinite { tensor: name.to_owned(), value }),
         None => Ok(values),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file of eight tensors whose sizes are right each, and together more than 64 bits count.
+    fn larger_than_any_file() -> Vec<u8> {
+        let size = u64::MAX / 8;
+        let tensors: Vec<String> = (0..8)
+            .map(|i| {
+                let (begin, end) = (i * size, (i + 1) * size);
+                format!(
+                    "\"{i}\":{{\"dtype\":\"U8\",\"shape\":[{size}],\"data_offsets\":[{begin},{end}]}}"
+                )
+            })
+            .collect();
+        let header = format!("{{{}}}", tensors.join(","));
+        let mut bytes = (header.len() as u64).to_le_bytes().to_vec();
+        bytes.extend(header.as_bytes());
+        bytes.extend([0; 8]);
+        bytes
+    }
+
+    #[test]
+    fn sizes_beyond_64_bits_are_a_damaged_header() {
+        let fault = decode(&larger_than_any_file(), 1).unwrap_err();
+        assert!(
+            matches!(&fault, Fault::Header(why) if why.contains("18446744073709551608")),
+            "{fault}"
+        );
     }
 }

@@ -138,11 +138,17 @@ impl TrainingError {
 /// Keeps candle to one thread unless `RAYON_NUM_THREADS` says otherwise: its pool waits
 /// actively, and at this network's size more threads are slower.
 ///
-/// To be called first thing in `main`, before any thread is started.
-pub fn single_threaded() {
+/// This variable is the only setting that both its matrix products and its own pool obey; they do
+/// not ask rayon's global pool.
+///
+/// # Safety
+///
+/// No other thread may be running: another one could read the environment while it changes. To be
+/// called first thing in `main`.
+pub unsafe fn single_threaded() {
     const THREADS: &str = "RAYON_NUM_THREADS";
     if std::env::var_os(THREADS).is_none() {
-        // SAFETY: the documented contract, no other thread is running yet.
+        // SAFETY: the caller vouches for it.
         unsafe { std::env::set_var(THREADS, "1") };
     }
 }

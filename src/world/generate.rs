@@ -213,7 +213,7 @@ pub fn generate(
     seed: u64,
     index: u64,
 ) -> Scene {
-    let stream = index.wrapping_mul(9).wrapping_add(3 * kind as u64 + level as u64);
+    let stream = index.wrapping_mul(9).wrapping_add(setting(kind, level));
     let mut lot = Lot {
         config,
         vehicle,
@@ -238,6 +238,22 @@ pub fn generate(
         points: Vec::new(),
         bounds: Some(box_in_world(bounds, &frame)),
     }
+}
+
+/// The number of a type and level, 0 to 8, which picks the random stream of their scenes. Written
+/// out and part of the data format, like [`Stream`]: whoever changes it changes every scene.
+fn setting(kind: ParkingType, level: Level) -> u64 {
+    let kind = match kind {
+        ParkingType::Forward => 0,
+        ParkingType::Reverse => 3,
+        ParkingType::Parallel => 6,
+    };
+    let level = match level {
+        Level::Easy => 0,
+        Level::Complex => 1,
+        Level::Extreme => 2,
+    };
+    kind + level
 }
 
 /// A parking lot in the making, in the spot frame.
@@ -479,4 +495,21 @@ fn box_in_world(area: Aabb, frame: &Frame) -> [f64; 4] {
     let corners = area.corners().map(|c| frame.world_from_local_point(c));
     let Aabb { min, max } = Aabb::around(corners);
     [min.x, min.y, max.x, max.y]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_numbers_of_types_and_levels_stay_what_they_are() {
+        let numbers = [
+            (ParkingType::Forward, [0, 1, 2]),
+            (ParkingType::Reverse, [3, 4, 5]),
+            (ParkingType::Parallel, [6, 7, 8]),
+        ];
+        for (kind, expected) in numbers {
+            assert_eq!(Level::ALL.map(|level| setting(kind, level)), expected, "{kind}");
+        }
+    }
 }

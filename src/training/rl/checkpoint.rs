@@ -1,7 +1,6 @@
 //! The state of a training, to go on with later: `NAME.checkpoint` beside the policy.
 
 use std::collections::BTreeMap;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use candle_core::{Device, Var};
@@ -144,8 +143,7 @@ pub fn write(
 
 /// Reads a checkpoint: the state, the agent and its memory.
 pub fn read(path: &Path, device: &Device) -> Result<(State, Sac, Replay), ArtefactError> {
-    let mut bytes = Vec::new();
-    artefact::open(path)?.read_to_end(&mut bytes).map_err(|e| Fault::Unreadable(e).of(path))?;
+    let bytes = artefact::read(path)?;
     decode(&bytes, device).map_err(|fault| fault.of(path))
 }
 
