@@ -239,6 +239,11 @@ impl LibrarySearch {
 }
 
 impl LookUp<'_> {
+    /// The least estimate of all manoeuvres that were not looked at yet, free or not.
+    pub fn least_estimate(&self) -> f64 {
+        self.search.queue.peek().map_or(f64::INFINITY, |Reverse(c)| c.estimate())
+    }
+
     /// The next plan in order of estimated cost that is free, costs less than `bound` and little
     /// more than estimated. Gives up after `tries` free manoeuvres that cannot be joined like that;
     /// when called again it goes on from there.

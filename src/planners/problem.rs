@@ -29,6 +29,9 @@ pub struct Problem {
     pub collision: CollisionWorld,
     /// Clearance that plans keep from obstacles, metres: see [`Problem::with_margin`].
     pub margin: f64,
+    /// The clearance asked for, metres: kept as well where start and goal do not force a way
+    /// nearer to something.
+    pub wanted_margin: f64,
 }
 
 /// A problem that has no solution by its own data.
@@ -134,6 +137,7 @@ impl Problem {
     ) -> Result<Problem, ProblemError> {
         let least = Self::MARGIN * vehicle.scale().min(1.0);
         let mut margin = if margin > Self::MARGIN { margin } else { least };
+        let wanted_margin = margin;
         let mut collision = CollisionWorld::new(&obstacles, bounds, &vehicle, margin);
         for smaller in Self::margins_below(margin, least) {
             if collision.pose_is_free(start) && collision.pose_is_free(goal) {
@@ -148,7 +152,17 @@ impl Problem {
         if !collision.pose_is_free(goal) {
             return Err(ProblemError::GoalInCollision(goal.into()));
         }
-        Ok(Problem { vehicle, frame, kind, start, goal, obstacles, collision, margin })
+        Ok(Problem {
+            vehicle,
+            frame,
+            kind,
+            start,
+            goal,
+            obstacles,
+            collision,
+            margin,
+            wanted_margin,
+        })
     }
 
     /// What is tried in turn where start or goal does not allow `margin`, metres.

@@ -102,7 +102,8 @@ impl Search {
         if let Some(guides) = &mut self.guides {
             guides.reset(problem);
         }
-        self.weight = config.heuristic_weight as f32;
+        // A careful search has lost its way once: it follows its estimates more greedily.
+        self.weight = config.heuristic_weight as f32 * if careful { 2.0 } else { 1.0 };
         self.nodes.clear();
         self.open.clear();
         self.since_curve = 0;

@@ -10,6 +10,7 @@
 
 mod centres;
 mod shortest;
+mod tidy;
 mod words;
 
 use self::centres::UnitGoal;
