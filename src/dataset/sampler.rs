@@ -54,7 +54,7 @@ impl<'a> Sampler<'a> {
     pub fn new(config: &'a CollectConfig) -> Self {
         Self {
             config,
-            planner: HybridAStar::hold(config.planner, config.solutions as usize),
+            planner: HybridAStar::hold(config.planner, config.solutions as usize).unrefined(),
             current: None,
         }
     }

@@ -37,6 +37,9 @@ impl AnalyticTail {
 /// Multiples of the entry step that settings within their ranges can ask for.
 const MOST_STRAIGHTS: u32 = 1001;
 
+/// What a curve with a motion too short to drive counts as more, in changes of gear.
+const TINY_MOTION: f64 = 2.0;
+
 /// A goal pose, and the poses from which the rest of the way into it is known.
 #[derive(Clone, Debug)]
 pub(crate) struct GoalSet {
@@ -221,11 +224,12 @@ impl Connection<'_> {
 }
 
 impl AnalyticExpansion {
-    /// The cheapest free way from the free pose `from` into `goal`.
+    /// The cheapest free way from the free pose `from` into `goal`, if it costs less than `bound`.
     pub fn connect<'a>(
         &mut self,
         from: Pose,
         goal: &'a GoalSet,
+        bound: f64,
         problem: &Problem,
         model: &CostModel,
     ) -> Option<Connection<'a>> {
@@ -239,10 +243,10 @@ impl AnalyticExpansion {
         }
         self.waiting.sort_unstable_by(|a, b| b.bound.total_cmp(&a.bound));
         loop {
-            let cheapest = self.candidates.peek().map_or(f64::INFINITY, |c| c.cost);
+            let cheapest = self.candidates.peek().map_or(bound, |c| c.cost);
             if let Some(w) = self.waiting.pop_if(|w| w.bound <= cheapest) {
                 let e = &goal.entries[w.target as usize];
-                let add = |cost| Some(cost + e.cost);
+                let add = |cost| Some(cost + e.cost).filter(|total| *total < bound);
                 self.add(&curves, e.pose, e.departure, w.target, add);
             } else {
                 let c = self.candidates.pop()?;
@@ -256,8 +260,8 @@ impl AnalyticExpansion {
         }
     }
 
-    /// The cheapest free curve from the free pose `from` to `to`, where the way goes on with
-    /// `departure`, and its cost, which is less than `bound`.
+    /// The cheapest free curve from the free pose `from`, where the car stands, to `to`, where the
+    /// way goes on with `departure`, and its cost, which is less than `bound`.
     pub fn curve(
         &mut self,
         from: Pose,
@@ -267,9 +271,25 @@ impl AnalyticExpansion {
         problem: &Problem,
         model: &CostModel,
     ) -> Option<(Word, f64)> {
+        self.curve_after(DriveState::PARKED, from, to, departure, bound, problem, model)
+    }
+
+    /// [`AnalyticExpansion::curve`] for a car that comes to `from` with `arrival`.
+    #[allow(clippy::too_many_arguments, reason = "two poses, two states, and what is to be kept")]
+    pub fn curve_after(
+        &mut self,
+        arrival: DriveState,
+        from: Pose,
+        to: Pose,
+        departure: DriveState,
+        bound: f64,
+        problem: &Problem,
+        model: &CostModel,
+    ) -> Option<(Word, f64)> {
         self.words.clear();
         self.candidates.clear();
-        let curves = Curves::new(from, &problem.vehicle, model);
+        let mut curves = Curves::new(from, &problem.vehicle, model);
+        curves.arrival = arrival;
         if curves.bound(to) >= bound {
             return None;
         }
@@ -294,8 +314,17 @@ impl AnalyticExpansion {
     ) {
         let first = self.words.len();
         reeds_shepp::words(curves.from, to, curves.radius, &mut self.words);
-        for (word, w) in (first as u32..).zip(&self.words[first..]) {
-            let (curve, arrival) = curve_cost(w, DriveState::PARKED, curves.vehicle, curves.model);
+        let least = CostModel::shortest_motion(curves.vehicle);
+        for (word, w) in (first as u32..).zip(&mut self.words[first..]) {
+            if w.shortest_segment() < least
+                && let Some(tidy) = w.without_shorter_than(least, curves.from, to)
+            {
+                *w = tidy;
+            }
+            let (mut curve, arrival) = curve_cost(w, curves.arrival, curves.vehicle, curves.model);
+            if w.shortest_segment() < least {
+                curve += TINY_MOTION * curves.model.gear_change;
+            }
             if let Some(cost) = cost(curve + curves.model.change(arrival, departure)) {
                 self.candidates.push(Candidate { cost, target, word });
             }
@@ -306,6 +335,8 @@ impl AnalyticExpansion {
 /// What the costs of all curves from one pose share.
 struct Curves<'a> {
     from: Pose,
+    /// How the car comes to `from`.
+    arrival: DriveState,
     radius: f64,
     vehicle: &'a Vehicle,
     model: &'a CostModel,
@@ -313,7 +344,8 @@ struct Curves<'a> {
 
 impl<'a> Curves<'a> {
     fn new(from: Pose, vehicle: &'a Vehicle, model: &'a CostModel) -> Self {
-        Self { from, radius: vehicle.turning_radius(), vehicle, model }
+        let (arrival, radius) = (DriveState::PARKED, vehicle.turning_radius());
+        Self { from, arrival, radius, vehicle, model }
     }
 
     /// A cost that no curve to `to` goes below.
@@ -344,6 +376,21 @@ fn curve_cost(
 /// −1, 0 or 1.
 fn sign_or_zero(v: f64) -> f64 {
     if v == 0.0 { 0.0 } else { v.signum() }
+}
+
+/// The least cost of any word from `from` into `goal`, ignoring obstacles.
+pub(super) fn lower_bound(
+    from: Pose,
+    goal: &GoalSet,
+    vehicle: &Vehicle,
+    model: &CostModel,
+    words: &mut Vec<Word>,
+) -> f64 {
+    let costs = goal
+        .entries()
+        .iter()
+        .map(|e| e.cost + least_curve_cost(from, e.pose, vehicle, model, words));
+    costs.fold(f64::INFINITY, f64::min)
 }
 
 /// The least cost of any word from `from` to `to`, ignoring obstacles: the non-holonomic
@@ -418,7 +465,7 @@ mod tests {
                     let (s, reach) = (problem.start, 2.0);
                     let from = Pose::new(s.x + r(reach), s.y + r(reach), s.heading + r(1.0));
                     let expected = exhaustive(from, &goal, &problem, &model);
-                    let got = expansion.connect(from, &goal, &problem, &model);
+                    let got = expansion.connect(from, &goal, f64::INFINITY, &problem, &model);
                     assert_eq!(got.map(|c| (c.cost, c.entry_index, c.word)), expected);
                     *(if expected.is_some() { &mut found } else { &mut none }) += 1;
                 }

@@ -14,7 +14,8 @@ use crate::vehicle::Vehicle;
 use super::analytic::least_curve_cost;
 use super::cost::CostModel;
 
-/// The table's steps: 1 m, so that a position's bin is its nearest integers, and 15°.
+/// The table's steps: 1 m (for the default vehicle; scaled for others), so that a position's bin
+/// is its nearest integers, and 15°.
 const HEADINGS: f32 = 24.0;
 /// It reaches so many metres along x to both sides and along y to one: driving is
 /// mirror-symmetric.
@@ -57,6 +58,8 @@ pub(super) struct View<'a> {
     /// The frame of the poses.
     frame: Pose,
     vehicle: &'a Vehicle,
+    /// Metres in a step of the table.
+    step: f64,
     model: &'a CostModel,
     /// By pose: its entry in the table, beyond its end where the table does not reach.
     entries: &'a [u32],
@@ -80,7 +83,10 @@ impl Approaches {
         }
         let (sin, cos) = frame.sin_cos();
         let (sin, cos) = (sin as f32, cos as f32);
-        let (at_x, at_y, turned) = (frame.x as f32, frame.y as f32, steps(frame.heading));
+        let step = vehicle.scale();
+        let per_metre = (1.0 / step) as f32;
+        let (at_x, at_y) = ((frame.x / step) as f32, (frame.y / step) as f32);
+        let (sin, cos, turned) = (sin * per_metre, cos * per_metre, steps(frame.heading));
         let columns = poses.x.iter().zip(&poses.y).zip(&poses.turn);
         self.entries.clear();
         self.entries.extend(columns.map(|((x, y), turn)| {
@@ -89,7 +95,7 @@ impl Approaches {
             entry(at_x + cos * x - sin * y, side * seen_y, side * (turned + turn))
         }));
         let Self { table, words, entries, .. } = self;
-        View { poses, frame, vehicle, model, entries, table, words }
+        View { poses, frame, vehicle, step, model, entries, table, words }
     }
 }
 
@@ -116,8 +122,8 @@ impl View<'_> {
         let (headings, side) = (HEADINGS as usize, SIDE as usize);
         let position = entry / headings;
         *stored = least(Pose::new(
-            (position % side) as f64 - f64::from(REACH),
-            (position / side) as f64,
+            ((position % side) as f64 - f64::from(REACH)) * self.step,
+            (position / side) as f64 * self.step,
             (entry % headings) as f64 / headings as f64 * TAU,
         ));
         *stored

@@ -3,13 +3,14 @@
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Aabb, Pose, signed_angle};
+use crate::vehicle::Vehicle;
 
 use super::analytic::GoalSet;
 use super::cost::CostModel;
 use super::multi_heuristic::MultiHeuristicConfig;
 use super::{NoPath, Problem};
 
-/// Settings of the search.
+/// Settings of the search; lengths are those for the default vehicle (see [`Vehicle::scale`]).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct HybridAStarConfig {
@@ -20,7 +21,8 @@ pub struct HybridAStarConfig {
     pub resolutions: [Resolution; 3],
     /// Side of a cell of the A* cost-to-go, metres.
     pub cost_to_go_cell: f64,
-    /// The search stays within the box of start and goal grown by this, metres.
+    /// A search stays within the box of start and goal grown by this, metres, as long as there
+    /// may be a way.
     pub domain_margin: f64,
     /// Whether a straight may lead into a bay (the goal set). `false` asks for curves that
     /// end at the parked pose itself: an ablation.
@@ -141,6 +143,33 @@ impl HybridAStarConfig {
         self.resolutions.iter().try_for_each(Resolution::validate)
     }
 
+    /// These settings with the lengths for `vehicle`.
+    pub fn for_vehicle(&self, vehicle: &Vehicle) -> Self {
+        let scale = vehicle.scale();
+        let resolution =
+            |r: Resolution| Resolution { cell: r.cell * scale, step: r.step * scale, ..r };
+        let position = self.goal_region.position * scale;
+        Self {
+            cost: self.cost.scaled(scale),
+            resolutions: self.resolutions.map(resolution),
+            cost_to_go_cell: self.cost_to_go_cell * scale,
+            domain_margin: self.domain_margin * scale,
+            entry_step: self.entry_step * scale,
+            entry_max: self.entry_max * scale,
+            goal_region: GoalRegion { position, ..self.goal_region },
+            ..*self
+        }
+    }
+
+    /// [`HybridAStarConfig::for_vehicle`]; fails where settings are out of their ranges, before
+    /// anything is sized by them.
+    pub(super) fn for_search(&self, vehicle: &Vehicle) -> Result<Self, NoPath> {
+        match self.validate() {
+            Ok(()) => Ok(self.for_vehicle(vehicle)),
+            Err(_) => Err(NoPath::Failed("settings out of range")),
+        }
+    }
+
     /// The goal of `problem` with the entry straights that are free.
     pub(super) fn goal_set(&self, problem: &Problem) -> GoalSet {
         let mut goal = GoalSet::single(problem.goal);
@@ -156,35 +185,75 @@ impl HybridAStarConfig {
         }
     }
 
-    /// Where a search may go: around start and goal, within the bounds.
-    pub(super) fn domain(&self, problem: &Problem, start: Pose, goal: Pose) -> Aabb {
-        let around = Aabb::around([start.position(), goal.position()]);
-        let mut domain = around.inflated(self.domain_margin);
-        if let Some(bounds) = problem.collision.bounds_aabb() {
-            domain.min = domain.min.sup(&bounds.min);
-            domain.max = domain.max.inf(&bounds.max);
+    /// Where a search may go, one box after another: around start and goal; farther around them;
+    /// around all obstacles, beyond which nothing is in the way. All within the bounds.
+    pub(super) fn domains(&self, problem: &Problem, start: Pose, goal: Pose) -> Vec<Aabb> {
+        let ends = Aabb::around([start.position(), goal.position()]);
+        let near = ends.inflated(self.domain_margin);
+        let farther = ends.inflated(4.0 * self.domain_margin);
+        let obstacles = problem.obstacles.aabb().inflated(self.domain_margin);
+        let whole = Aabb { min: near.min.inf(&obstacles.min), max: near.max.sup(&obstacles.max) };
+        let within = |mut domain: Aabb| {
+            if let Some(bounds) = problem.collision.bounds_aabb() {
+                domain.min = domain.min.sup(&bounds.min);
+                domain.max = domain.max.inf(&bounds.max);
+            }
+            domain
+        };
+        let common = |a: Aabb, b: Aabb| Aabb { min: a.min.sup(&b.min), max: a.max.inf(&b.max) };
+        let mut domains = vec![within(near)];
+        for larger in [within(common(farther, whole)), within(whole)] {
+            if domains.last() != Some(&larger) {
+                domains.push(larger);
+            }
         }
-        domain
+        domains
     }
 
     /// Runs `search` on each lattice, coarse to fine, until it finds something or the goal
     /// turns out to be enclosed. `expansions` is reduced by what was spent: finer lattices
-    /// are left their share even when a coarse one goes on and on. Settings out of their ranges
-    /// fail before anything is sized by them.
+    /// are left their share even when a coarse one goes on and on.
+    ///
+    /// On each lattice the domain grows while there is no way within it; and a search that does
+    /// not come to an end soon begins anew, careful of gaps that the car does not pass.
     pub(super) fn coarse_to_fine<T>(
         &self,
+        domains: &[Aabb],
         expansions: &mut usize,
-        mut search: impl FnMut(&Resolution, &mut usize) -> Result<T, NoPath>,
+        mut search: impl FnMut(Attempt, &mut usize) -> Result<T, NoPath>,
     ) -> Result<T, NoPath> {
-        if self.validate().is_err() {
-            return Err(NoPath::Failed("settings out of range"));
-        }
+        /// Of what a lattice may spend, the part for the first look.
+        const FIRST_LOOK: usize = 8;
         let mut result = Err(NoPath::BudgetSpent);
+        let mut domain = 0;
         for (i, resolution) in self.resolutions.iter().enumerate() {
             let last = i + 1 == self.resolutions.len();
             let reserve = if last { 0 } else { *expansions / 2 };
             *expansions -= reserve;
-            result = search(resolution, expansions);
+            loop {
+                let later = *expansions - *expansions / FIRST_LOOK;
+                *expansions -= later;
+                let (config, within) = (self, domains[domain]);
+                let first = Attempt { config, resolution, domain: within, careful: false };
+                result = search(first, expansions);
+                *expansions += later;
+                let grows = domain + 1 < domains.len();
+                match result {
+                    Err(NoPath::Enclosed | NoPath::Exhausted) if grows => domain += 1,
+                    Err(NoPath::BudgetSpent) => {
+                        domain += usize::from(grows);
+                        let again = Attempt { domain: domains[domain], careful: true, ..first };
+                        result = search(again, expansions);
+                        if !matches!(result, Err(NoPath::Enclosed | NoPath::Exhausted))
+                            || domain + 1 == domains.len()
+                        {
+                            break;
+                        }
+                        domain += 1;
+                    }
+                    _ => break,
+                }
+            }
             *expansions += reserve;
             if !matches!(result, Err(NoPath::BudgetSpent | NoPath::Exhausted)) {
                 break;
@@ -192,6 +261,19 @@ impl HybridAStarConfig {
         }
         result
     }
+}
+
+/// One search of several for the same path.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Attempt<'a> {
+    /// The settings for the vehicle.
+    pub config: &'a HybridAStarConfig,
+    /// How finely it looks.
+    pub resolution: &'a Resolution,
+    /// Where it may go.
+    pub domain: Aabb,
+    /// Whether its cost-to-go shuns gaps in which the car fits at no heading.
+    pub careful: bool,
 }
 
 #[cfg(test)]

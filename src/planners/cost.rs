@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::curves::Segment;
 use crate::vehicle::{Gear, Vehicle};
 
-/// Weights of the cost terms.
+/// Weights of the cost terms, those of changes for the default vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CostModel {
@@ -22,11 +22,24 @@ pub struct CostModel {
     pub steer: f64,
     /// Per radian of |Δδ| between segments.
     pub steer_change: f64,
+    /// Per metre driven nearer to an obstacle than `near`; where a margin that was asked for is not
+    /// kept because of start or goal, eight times as much within it.
+    pub clearance: f64,
+    /// What is near, metres.
+    pub near: f64,
 }
 
 impl Default for CostModel {
     fn default() -> Self {
-        Self { forward: 1.0, backward: 1.2, gear_change: 3.0, steer: 0.05, steer_change: 0.2 }
+        Self {
+            forward: 1.0,
+            backward: 1.2,
+            gear_change: 3.0,
+            steer: 0.05,
+            steer_change: 0.2,
+            clearance: 0.4,
+            near: 0.2,
+        }
     }
 }
 
@@ -53,6 +66,8 @@ impl CostModel {
             ("gear_change", self.gear_change, 0.0),
             ("steer", self.steer, 0.0),
             ("steer_change", self.steer_change, 0.0),
+            ("clearance", self.clearance, 0.0),
+            ("near", self.near, 0.0),
         ] {
             if !(v.is_finite() && v >= min && v <= 1e6) {
                 return Err(format!("cost.{field} is {v}; expected a number from {min} to 1e6"));
@@ -61,12 +76,25 @@ impl CostModel {
         Ok(())
     }
 
+    /// The weights for a vehicle `scale` times as long as the default one: what a change is
+    /// worth is counted in metres, too.
+    pub fn scaled(&self, scale: f64) -> Self {
+        let (gear_change, steer_change) = (self.gear_change * scale, self.steer_change * scale);
+        Self { gear_change, steer_change, near: self.near * scale, ..*self }
+    }
+
     /// Cost per metre in `gear`, without steering.
     pub fn per_metre(&self, gear: Gear) -> f64 {
         match gear {
             Gear::Forward => self.forward,
             Gear::Backward => self.backward,
         }
+    }
+
+    /// Motions shorter than this are not worth driving, metres: what costs less than that is to be
+    /// reached otherwise where it can be.
+    pub fn shortest_motion(vehicle: &Vehicle) -> f64 {
+        0.01 * vehicle.scale()
     }
 
     /// Cost of changing gear and steering between two motions.

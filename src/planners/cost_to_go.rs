@@ -8,7 +8,7 @@
 //! A cell is blocked only where the disc collides from every point of it, so that an infinite
 //! distance is a proof: no motion within the domain leads there.
 
-use std::f64::consts::FRAC_1_SQRT_2;
+use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 use crate::geometry::{Aabb, Pose, Vec2, distance_to_segment};
 use crate::vehicle::Vehicle;
@@ -30,7 +30,12 @@ const STEPS: [(i32, i32, u32); 8] = [
     (-1, 1, 14),
     (-1, -1, 14),
 ];
-const BUCKETS: usize = 16;
+/// How many times as far a step counts into a cell where the car fits at no heading.
+const NARROW: u32 = 12;
+/// More than the costliest step.
+const BUCKETS: usize = 256;
+/// Headings at which a careful wave asks whether the car fits.
+const HEADINGS: usize = 16;
 /// Cells per side of a page.
 const PAGE: usize = 64;
 /// No page yet.
@@ -51,7 +56,10 @@ pub(super) struct CostToGo {
     page_of: Vec<u32>,
     /// Costs of all pages, `PAGE × PAGE` each.
     costs: Vec<u32>,
-    buckets: [Vec<(i32, i32)>; BUCKETS],
+    /// By cell of all pages, where the wave is careful: whether the car fits, as far as asked.
+    fits: Vec<Option<bool>>,
+    careful: bool,
+    buckets: Vec<Vec<(i32, i32)>>,
     /// The cost whose bucket is being emptied.
     front: u32,
     /// Entries in all buckets.
@@ -69,7 +77,17 @@ impl CostToGo {
 
     /// Prepares distances to `goal` within `domain` for `vehicle`, in cells of
     /// [`CostToGo::cell`].
-    pub fn reset(&mut self, domain: &Aabb, wanted: f64, vehicle: &Vehicle, goal: Pose) {
+    ///
+    /// A `careful` wave takes what is no proof into account as well: where the car fits at no
+    /// heading in a cell's middle, it counts the way through as much longer.
+    pub fn reset(
+        &mut self,
+        domain: &Aabb,
+        wanted: f64,
+        careful: bool,
+        vehicle: &Vehicle,
+        goal: Pose,
+    ) {
         let extent = domain.max - domain.min;
         let cell = Self::cell(wanted, vehicle);
         self.origin = domain.min;
@@ -82,6 +100,9 @@ impl CostToGo {
         self.page_of.clear();
         self.page_of.resize(self.pages_x * pages(self.size.1), NONE);
         self.costs.clear();
+        self.fits.clear();
+        self.careful = careful;
+        self.buckets.resize_with(BUCKETS, Vec::new);
         self.buckets.iter_mut().for_each(Vec::clear);
         self.front = 0;
         self.waiting = 0;
@@ -128,10 +149,14 @@ impl CostToGo {
                     continue;
                 }
                 let j = self.index(next, world);
-                let cost = self.front + step;
                 let known = self.costs[j];
                 // Settled costs are larger than any other number.
-                if known == UNKNOWN || cost < known && known < BLOCKED {
+                if known == BLOCKED || known > UNKNOWN {
+                    continue;
+                }
+                let narrow = self.careful && !self.fits(next, j, world);
+                let cost = self.front + if narrow { NARROW * step } else { step };
+                if cost < known {
                     self.costs[j] = cost;
                     self.buckets[cost as usize % BUCKETS].push(next);
                     self.waiting += 1;
@@ -139,6 +164,19 @@ impl CostToGo {
             }
         }
         self.front += 1;
+    }
+
+    /// Whether the car fits into the middle of a cell, kept at `index`, at some heading.
+    fn fits(&mut self, (x, y): (i32, i32), index: usize, world: &CollisionWorld) -> bool {
+        if let Some(fits) = self.fits[index] {
+            return fits;
+        }
+        let middle = self.origin + Vec2::new(f64::from(x), f64::from(y)) * self.cell;
+        let heading = |i: usize| i as f64 / HEADINGS as f64 * TAU;
+        let fits =
+            (0..HEADINGS).any(|i| world.pose_is_free(Pose::new(middle.x, middle.y, heading(i))));
+        self.fits[index] = Some(fits);
+        fits
     }
 
     fn cell_of(&self, p: Vec2) -> Option<(i32, i32)> {
@@ -167,6 +205,9 @@ impl CostToGo {
         let page = (first / (PAGE * PAGE)) as u32;
         self.page_of[page_y * self.pages_x + page_x] = page;
         self.costs.resize(first + PAGE * PAGE, UNKNOWN);
+        if self.careful {
+            self.fits.resize(first + PAGE * PAGE, None);
+        }
         if self.reach <= 0.0 {
             return page;
         }
@@ -220,10 +261,10 @@ mod tests {
         let domain = Aabb::new(-10.0, -10.0, 20.0, 20.0);
         let mut c = CostToGo::default();
         let goal = Pose::new(10.0, 0.0, 0.0);
-        c.reset(&domain, 0.5, &vehicle, goal);
+        c.reset(&domain, 0.5, false, &vehicle, goal);
         let open = world(&[], &vehicle);
         assert!((c.distance(Vec2::new(0.0, 0.0), &open) - 10.0).abs() < 0.5);
-        c.reset(&domain, 0.5, &vehicle, goal);
+        c.reset(&domain, 0.5, false, &vehicle, goal);
         let wall = world(&[[4.8, -10.0, 5.2, 5.0]], &vehicle);
         let around = c.distance(Vec2::new(0.0, 0.0), &wall);
         assert!((14.0..17.0).contains(&around), "{around}");
@@ -241,7 +282,7 @@ mod tests {
         let world = world(&ring, &vehicle);
         let mut c = CostToGo::default();
         let domain = Aabb::new(-10.0, -10.0, 10.0, 10.0);
-        c.reset(&domain, 0.5, &vehicle, Pose::default());
+        c.reset(&domain, 0.5, false, &vehicle, Pose::default());
         assert_eq!(c.distance(Vec2::new(8.0, 8.0), &world), f64::INFINITY);
         assert!(c.distance(Vec2::new(0.5, 0.5), &world) < 1.0);
     }
@@ -278,7 +319,7 @@ mod tests {
                 let world = world(&walls, &vehicle);
                 let domain = Aabb::new(-long, -long, 2.0 * long, long);
                 let mut c = CostToGo::default();
-                c.reset(&domain, 0.5, &vehicle, Pose::new(-long / 2.0, y, 0.0));
+                c.reset(&domain, 0.5, false, &vehicle, Pose::new(-long / 2.0, y, 0.0));
                 let through = c.distance(Vec2::new(1.5 * long, y), &world);
                 assert!(through < 2.3 * long, "{vehicle:?} {offset}: {through}");
             }
@@ -292,7 +333,7 @@ mod tests {
         let mut c = CostToGo::default();
         // 46,000 cells a side: their number is beyond 32 bits.
         let domain = Aabb::new(0.0, 0.0, 2300.0, 2300.0);
-        c.reset(&domain, 0.05, &vehicle, Pose::new(1.0, 1.0, 0.0));
+        c.reset(&domain, 0.05, false, &vehicle, Pose::new(1.0, 1.0, 0.0));
         let near = c.distance(Vec2::new(30.0, 1.0), &open);
         assert!((near - 29.0).abs() < 0.1, "{near}");
         let far = c.distance(Vec2::new(2299.0, 2299.0), &open);

@@ -10,14 +10,19 @@
 //! a coarse lattice is exhausted, as in a parallel spot barely longer than the car, a finer
 //! one gets its turn.
 
+use crate::curves::reeds_shepp::Word;
 use crate::curves::{Path, Segment};
 use crate::geometry::Pose;
+use crate::vehicle::Vehicle;
 
-use super::analytic::{AnalyticExpansion, AnalyticTail};
+use super::analytic::{AnalyticExpansion, AnalyticTail, lower_bound};
 pub(crate) use super::analytic::{Connection, Entry, GoalSet};
-use super::config::{HybridAStarConfig, Resolution};
+use super::config::{Attempt, HybridAStarConfig};
+use super::cost::CostModel;
 use super::multi_heuristic::Guides;
-use super::search::Search;
+use super::nearness::Nearness;
+use super::search::{NodeIndex, Search};
+use super::shortcut::Shortcuts;
 use super::{Budget, NoPath, PlanResult, Planner, Problem};
 
 /// Hybrid A* with Reeds-Shepp expansion: the methods `ha-rs` and `ha-hold`.
@@ -28,7 +33,17 @@ pub struct HybridAStar {
     solutions: usize,
     queue: Search,
     analytic: AnalyticExpansion,
+    shortcuts: Shortcuts,
+    words: Vec<Word>,
+    /// Whether plans are refined.
+    refines: bool,
 }
+
+/// A plan that costs at most so many times what it must cost at least is good enough.
+const ENOUGH: f64 = 1.1;
+/// Expansions that may be spent on something better than a known plan, at least; as many as the
+/// plan took where that is more.
+const PATIENCE: usize = 400;
 
 /// What one search found.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,8 +65,20 @@ impl HybridAStar {
     /// The cheapest of the first `solutions` found (fewer where nothing cheaper can follow);
     /// with five the paper's HA* Hold, the method `ha-hold`.
     pub fn hold(config: HybridAStarConfig, solutions: usize) -> Self {
-        let (queue, analytic) = (Search::default(), AnalyticExpansion::default());
-        Self { config, solutions: solutions.max(1), queue, analytic }
+        Self {
+            config,
+            solutions: solutions.max(1),
+            queue: Search::default(),
+            analytic: AnalyticExpansion::default(),
+            shortcuts: Shortcuts::default(),
+            words: Vec::new(),
+            refines: true,
+        }
+    }
+
+    /// The same search whose solutions are left as they are found: what data are collected with.
+    pub fn unrefined(self) -> Self {
+        Self { refines: false, ..self }
     }
 
     /// The first solution found by a search that follows `guides` as well.
@@ -66,7 +93,12 @@ impl HybridAStar {
 
     /// The goal of `problem` with the entry straights that are free.
     pub(crate) fn goal_set(&self, problem: &Problem) -> GoalSet {
-        self.config.goal_set(problem)
+        self.config.for_vehicle(&problem.vehicle).goal_set(problem)
+    }
+
+    /// The cost of driving `vehicle`.
+    pub(crate) fn cost(&self, vehicle: &Vehicle) -> CostModel {
+        self.config.cost.scaled(vehicle.scale())
     }
 
     /// [`HybridAStar::goal_set`] that also has the entries of a cell whose goal lies `shift`
@@ -74,7 +106,7 @@ impl HybridAStar {
     pub(crate) fn goal_set_of_cell(&self, problem: &Problem, shift: f64) -> GoalSet {
         let mut goal = self.goal_set(problem);
         if shift > 0.0 {
-            self.config.add_straights(problem, shift, &mut goal);
+            self.config.for_vehicle(&problem.vehicle).add_straights(problem, shift, &mut goal);
         }
         goal
     }
@@ -86,7 +118,19 @@ impl HybridAStar {
         from: Pose,
         goal: &'a GoalSet,
     ) -> Option<Connection<'a>> {
-        self.analytic.connect(from, goal, problem, &self.config.cost)
+        self.connect_below(problem, from, goal, f64::INFINITY)
+    }
+
+    /// [`HybridAStar::connect`] at a cost of less than `bound`.
+    pub(crate) fn connect_below<'a>(
+        &mut self,
+        problem: &Problem,
+        from: Pose,
+        goal: &'a GoalSet,
+        bound: f64,
+    ) -> Option<Connection<'a>> {
+        let cost = self.cost(&problem.vehicle);
+        self.analytic.connect(from, goal, bound, problem, &cost)
     }
 
     /// Searches from `start` to `goal` within `expansions`, which is reduced by what was
@@ -107,7 +151,18 @@ impl HybridAStar {
 
     /// A leg that is one curve and the rest of an entry.
     pub(crate) fn direct(&mut self, problem: &Problem, start: Pose, goal: &GoalSet) -> Option<Leg> {
-        let c = self.connect(problem, start, goal)?;
+        self.direct_below(problem, start, goal, f64::INFINITY)
+    }
+
+    /// [`HybridAStar::direct`] at a cost of less than `bound`.
+    pub(crate) fn direct_below(
+        &mut self,
+        problem: &Problem,
+        start: Pose,
+        goal: &GoalSet,
+        bound: f64,
+    ) -> Option<Leg> {
+        let c = self.connect_below(problem, start, goal, bound)?;
         Some(Leg { path: Path::new(start, c.segments()), cost: c.cost, entry: c.entry_index })
     }
 
@@ -121,9 +176,10 @@ impl HybridAStar {
         expansions: &mut usize,
     ) -> Result<Leg, NoPath> {
         let mut best = direct;
-        let config = self.config;
-        let result = config.coarse_to_fine(expansions, |resolution, expansions| {
-            let result = self.search_leg(resolution, problem, start, goal, &mut best, expansions);
+        let config = self.config.for_search(&problem.vehicle)?;
+        let domains = config.domains(problem, start, goal.pose);
+        let result = config.coarse_to_fine(&domains, expansions, |attempt, expansions| {
+            let result = self.search_leg(attempt, problem, start, goal, &mut best, expansions);
             if best.is_some() { Ok(()) } else { result }
         });
         result.map(|()| best.expect("a search that succeeds leaves a leg"))
@@ -132,7 +188,7 @@ impl HybridAStar {
     /// One search at one resolution, for something cheaper than `best`.
     fn search_leg(
         &mut self,
-        resolution: &Resolution,
+        attempt: Attempt,
         problem: &Problem,
         start: Pose,
         goal: &GoalSet,
@@ -140,8 +196,7 @@ impl HybridAStar {
         expansions: &mut usize,
     ) -> Result<(), NoPath> {
         let mut wanted = self.solutions - usize::from(best.is_some());
-        let domain = self.config.domain(problem, start, goal.pose);
-        self.queue.begin(&self.config, resolution, problem, domain, start, goal);
+        self.queue.begin(attempt, problem, start, goal);
         while let Some(node) = self.queue.pop() {
             let bound = best.as_ref().map_or(f64::INFINITY, |leg| leg.cost);
             if self.queue.estimate(node) >= bound {
@@ -151,27 +206,115 @@ impl HybridAStar {
                 return Err(NoPath::BudgetSpent);
             }
             *expansions -= 1;
-            if self.queue.wants_curve(node) {
-                let departure = self.queue.departure(node, goal);
-                let (to, model) = (self.queue.pose(node), &self.config.cost);
-                let way_cost = self.queue.cost(node);
-                let bound = bound - way_cost;
-                let curve = self.analytic.curve(start, to, departure, bound, problem, model);
-                if let Some((word, cost)) = curve {
-                    let (way, entry) = self.queue.way(node);
-                    let mut path = Path::new(start, word.segments().iter().copied());
-                    path.extend(way);
-                    path.extend(goal.entries()[entry].rest.iter().copied());
-                    *best = Some(Leg { path, cost: way_cost + cost, entry });
-                    wanted -= 1;
-                    if wanted == 0 {
-                        return Ok(());
-                    }
+            if self.queue.wants_curve(node)
+                && let Some(leg) = self.close(attempt, problem, start, goal, node, bound)
+            {
+                *best = Some(leg);
+                wanted -= 1;
+                if wanted == 0 {
+                    return Ok(());
                 }
             }
-            self.queue.expand(node, goal, &self.config, problem);
+            self.queue.expand(node, goal, attempt.config, problem);
         }
         Err(self.queue.stop())
+    }
+
+    /// One search from the start of `problem` for something cheaper than `best`, until nothing much
+    /// cheaper can follow or the expansions are spent.
+    fn improve(
+        &mut self,
+        attempt: Attempt,
+        problem: &Problem,
+        goal: &GoalSet,
+        best: &mut Option<Leg>,
+        expansions: &mut usize,
+    ) -> Result<(), NoPath> {
+        let start = problem.start;
+        self.queue.begin(attempt, problem, start, goal);
+        while let Some(node) = self.queue.pop() {
+            let bound = best.as_ref().map_or(f64::INFINITY, |leg| leg.cost);
+            if self.queue.estimate(node) * ENOUGH >= bound {
+                return Ok(());
+            }
+            if *expansions == 0 {
+                return Err(NoPath::BudgetSpent);
+            }
+            *expansions -= 1;
+            if self.queue.wants_curve(node)
+                && let Some(leg) = self.close(attempt, problem, start, goal, node, bound)
+            {
+                *best = Some(leg);
+            }
+            self.queue.expand(node, goal, attempt.config, problem);
+        }
+        Err(self.queue.stop())
+    }
+
+    /// The path by a curve from `start` to `node` and the way on from there, if it is free and costs
+    /// less than `bound`.
+    fn close(
+        &mut self,
+        attempt: Attempt,
+        problem: &Problem,
+        start: Pose,
+        goal: &GoalSet,
+        node: NodeIndex,
+        bound: f64,
+    ) -> Option<Leg> {
+        let departure = self.queue.departure(node, goal);
+        let (to, model) = (self.queue.pose(node), &attempt.config.cost);
+        let way_cost = self.queue.cost(node);
+        let curve = self.analytic.curve(start, to, departure, bound - way_cost, problem, model);
+        let (word, cost) = curve?;
+        let (way, entry) = self.queue.way(node);
+        let mut path = Path::new(start, word.segments().iter().copied());
+        path.extend(way);
+        path.extend(goal.entries()[entry].rest.iter().copied());
+        Some(Leg { path, cost: way_cost + cost, entry })
+    }
+
+    /// What driving `path` costs, nearness included.
+    pub(crate) fn cost_of(&self, problem: &Problem, path: &Path) -> f64 {
+        let model = self.cost(&problem.vehicle);
+        let nearness = Nearness::new(problem, &model);
+        model.path(&problem.vehicle, &path.segments) + nearness.of_path(path)
+    }
+
+    /// What any path into `goal` costs at least, obstacles aside.
+    pub(crate) fn lower_bound(&mut self, problem: &Problem, goal: &GoalSet) -> f64 {
+        let model = self.cost(&problem.vehicle);
+        lower_bound(problem.start, goal, &problem.vehicle, &model, &mut self.words)
+    }
+
+    /// `path` or a better one: its corners are cut, and where it still costs much more than it must,
+    /// a search looks for something cheaper, within `patience` of the expansions `left`.
+    pub(crate) fn refine(
+        &mut self,
+        problem: &Problem,
+        goal: &GoalSet,
+        path: Path,
+        patience: usize,
+        left: &mut usize,
+    ) -> Path {
+        let model = self.cost(&problem.vehicle);
+        let (path, cost) = self.shortcuts.cut(problem, goal, &model, path);
+        if cost <= ENOUGH * self.lower_bound(problem, goal) {
+            return path;
+        }
+        let Ok(config) = self.config.for_search(&problem.vehicle) else { return path };
+        let domain = config.domains(problem, problem.start, goal.pose)[0];
+        let resolution = &config.resolutions[0];
+        let attempt = Attempt { config: &config, resolution, domain, careful: false };
+        let share = patience.min(*left);
+        let mut spend = share;
+        let mut best = Some(Leg { path: path.clone(), cost, entry: 0 });
+        // Whatever ends it: what counts is what it found.
+        let _ = self.improve(attempt, problem, goal, &mut best, &mut spend);
+        *left -= share - spend;
+        let Some(found) = best.filter(|leg| leg.path != path) else { return path };
+        let (found, found_cost) = self.shortcuts.cut(problem, goal, &model, found.path);
+        if found_cost < cost { found } else { path }
     }
 
     /// The preparatory pose of a solved `path`, and the curve from there to the goal.
@@ -212,7 +355,7 @@ impl HybridAStar {
             };
             let mut whole = leg.path;
             whole.extend(tail.segments());
-            let cost = self.config.cost.path(&problem.vehicle, &whole.segments);
+            let cost = self.cost(&problem.vehicle).path(&problem.vehicle, &whole.segments);
             if two_curves.is_none_or(|(best, _)| cost < best - EQUAL) {
                 two_curves = Some((cost, tail));
             }
@@ -224,7 +367,7 @@ impl HybridAStar {
     /// the path's curvature or gear changes, that one curve from the start joins at the least
     /// cost. What lies before it is replaceable by that curve from starts nearby as well.
     pub fn manoeuvre(&mut self, problem: &Problem, path: &Path) -> Option<Vec<Segment>> {
-        let cost = self.config.cost;
+        let cost = self.cost(&problem.vehicle);
         let mut best: Option<(f64, usize)> = None;
         for (i, (pose, _)) in path.legs().enumerate() {
             let Some(mut leg) = self.direct(problem, path.start, &GoalSet::single(pose)) else {
@@ -249,9 +392,14 @@ impl Planner for HybridAStar {
         let goal = self.goal_set(problem);
         let mut left = budget.max_expansions;
         let leg = self.leg(problem, problem.start, &goal, &mut left);
+        let spent = budget.max_expansions - left;
+        let path = leg.map(|leg| match self.refines {
+            true => self.refine(problem, &goal, leg.path, spent.max(PATIENCE), &mut left),
+            false => leg.path,
+        });
         let expansions = budget.max_expansions - left;
-        match leg {
-            Ok(leg) => PlanResult::certified(problem, leg.path, expansions),
+        match path {
+            Ok(path) => PlanResult::certified(problem, path, expansions),
             Err(reason) => PlanResult::none(reason, expansions),
         }
     }

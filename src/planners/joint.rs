@@ -11,11 +11,11 @@ use crate::curves::{Path, Segment};
 use crate::geometry::{Pose, signed_angle};
 
 use super::Problem;
+use super::cost::CostModel;
+use crate::vehicle::Vehicle;
 
 /// Newton steps per attempt.
 const STEPS: usize = 12;
-/// Shorter motions are not made, metres.
-const SHORTEST: f64 = 1e-3;
 /// Remaining error that counts as none, metres and radians.
 const EXACT: f64 = 1e-10;
 
@@ -26,7 +26,7 @@ pub(super) fn close(problem: &Problem, path: &Path) -> Option<Path> {
     path.segments.iter().enumerate().find_map(|(i, s)| {
         target = s.end(target);
         let (first, rest) = path.segments.split_at(i + 1);
-        let bent = bend(first, problem.start, target, problem.vehicle.max_curvature())?;
+        let bent = bend(first, problem.start, target, &problem.vehicle)?;
         let path = Path::new(problem.start, bent.into_iter().chain(rest.iter().copied()));
         problem.collision.path_is_free(&path).then_some(path)
     })
@@ -39,9 +39,10 @@ fn bend(
     segments: &[Segment],
     start: Pose,
     target: Pose,
-    max_curvature: f64,
+    vehicle: &Vehicle,
 ) -> Option<Vec<Segment>> {
     const H: f64 = 1e-6;
+    let (max_curvature, shortest) = (vehicle.max_curvature(), CostModel::shortest_motion(vehicle));
     if segments.len() < 2 {
         return None; // Two parameters cannot meet three numbers.
     }
@@ -71,9 +72,9 @@ fn bend(
             let gear = s.gear().sign();
             let length = gear * (s.length + by_length);
             let curvature = s.curvature + by_curvature * max_curvature;
-            fixed[0] |= length < SHORTEST;
+            fixed[0] |= length < shortest;
             fixed[1] |= curvature.abs() > max_curvature;
-            s.length = gear * length.max(SHORTEST);
+            s.length = gear * length.max(shortest);
             s.curvature = curvature.clamp(-max_curvature, max_curvature);
         }
     }
@@ -120,8 +121,9 @@ mod tests {
 
     #[test]
     fn a_bent_path_meets_both_ends_within_the_limits() {
-        let max = 0.25;
-        let segments = [(0.25, 2.0), (0.0, 3.0), (-0.125, 1.6), (0.25, -2.4)]
+        let vehicle = Vehicle::default();
+        let max = vehicle.max_curvature();
+        let segments = [(0.24, 2.0), (0.0, 3.0), (-0.125, 1.6), (0.24, -2.4)]
             .map(|(curvature, length)| Segment { curvature, length });
         let near = Pose::new(1.0, 2.0, 0.3);
         let target = end_of(&segments, near);
@@ -129,7 +131,7 @@ mod tests {
             [(0.2, 0.0, 0.0), (0.0, -0.2, 0.0), (0.1, 0.1, 0.08), (0.0, 0.0, -0.08)]
         {
             let start = Pose::new(near.x + dx, near.y + dy, near.heading + turn);
-            let bent = bend(&segments, start, target, max).expect("enough motions to bend");
+            let bent = bend(&segments, start, target, &vehicle).expect("enough motions to bend");
             let end = end_of(&bent, start);
             assert!(end.distance(target) < 1e-9, "{dx} {dy} {turn}: {end:?}");
             assert!(signed_angle(end.heading, target.heading).abs() < 1e-9);
@@ -142,6 +144,6 @@ mod tests {
     fn what_cannot_be_met_is_not_claimed() {
         let straight = [Segment::straight(1.0), Segment::straight(-1.0)];
         let far = Pose::new(0.0, 50.0, 3.0);
-        assert_eq!(bend(&straight, Pose::default(), far, 0.25), None);
+        assert_eq!(bend(&straight, Pose::default(), far, &Vehicle::default()), None);
     }
 }

@@ -61,7 +61,14 @@ impl Library {
     }
 
     /// Adds one more.
-    pub fn add(&mut self, segments: Vec<Segment>, model: &CostModel) {
+    ///
+    /// What turns a little tighter than the vehicle can is driven at full lock: a manoeuvre begins
+    /// wherever its motions lead back to from the goal.
+    pub fn add(&mut self, mut segments: Vec<Segment>, model: &CostModel) {
+        let limit = self.vehicle.max_curvature();
+        for s in &mut segments {
+            s.curvature = s.curvature.clamp(-limit, limit);
+        }
         let mut pose = Pose::default();
         let mut motions = Vec::new();
         for back in segments.iter().rev().map(|s| s.reversed()) {
@@ -179,8 +186,8 @@ impl Candidate {
 
     /// The cost up to which a plan by this candidate is preferred to the next one's: one more
     /// change of gear and some steering than estimated.
-    fn window(self) -> f64 {
-        self.estimate() + 4.0
+    fn window(self, model: &CostModel) -> f64 {
+        self.estimate() + 4.0 / 3.0 * model.gear_change
     }
 }
 
@@ -232,6 +239,11 @@ impl LibrarySearch {
 }
 
 impl LookUp<'_> {
+    /// The least estimate of all manoeuvres that were not looked at yet, free or not.
+    pub fn least_estimate(&self) -> f64 {
+        self.search.queue.peek().map_or(f64::INFINITY, |Reverse(c)| c.estimate())
+    }
+
     /// The next plan in order of estimated cost that is free, costs less than `bound` and little
     /// more than estimated. Gives up after `tries` free manoeuvres that cannot be joined like that;
     /// when called again it goes on from there.
@@ -246,7 +258,7 @@ impl LookUp<'_> {
             self.search.queue.pop();
             if self.verdicts.is_free(self.library, candidate.index(), self.problem) {
                 self.search.free.push(candidate);
-                let plan = self.join(candidate, bound.min(candidate.window()));
+                let plan = self.join(candidate, bound.min(candidate.window(self.model)));
                 if plan.is_some() {
                     return plan;
                 }
@@ -261,7 +273,7 @@ impl LookUp<'_> {
         let tries = tries.min(self.search.free.len());
         (0..tries).find_map(|i| {
             let candidate = self.search.free[i];
-            if candidate.window() < bound { self.join(candidate, bound) } else { None }
+            if candidate.window(self.model) < bound { self.join(candidate, bound) } else { None }
         })
     }
 

@@ -19,12 +19,14 @@ mod joint;
 mod lattice;
 pub mod library;
 mod multi_heuristic;
+mod nearness;
 mod nonholonomic;
 mod open;
 mod plain;
 mod problem;
 mod scenario;
 mod search;
+mod shortcut;
 
 pub use analytic::AnalyticTail;
 pub use config::{GoalRegion, HybridAStarConfig, Resolution};

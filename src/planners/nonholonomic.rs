@@ -1,5 +1,5 @@
 //! The non-holonomic half of the heuristic: least Reeds-Shepp cost from the start, tabulated in
-//! steps of 0.4 m and 5° up to 20 m.
+//! steps of 0.4 m and 5° up to 20 m (for the default vehicle; scaled for others).
 //!
 //! Depends on the start-relative pose only, so the table serves every problem of one
 //! vehicle. Entries are computed when first asked for, each at its bin's centre: the value
@@ -26,6 +26,8 @@ const HEADINGS: usize = 72;
 #[derive(Debug, Default)]
 pub(super) struct NonHolonomic {
     made_for: Option<(Vehicle, CostModel)>,
+    /// Bins per metre.
+    per_metre: f64,
     table: Vec<f32>,
     words: Vec<Word>,
 }
@@ -35,6 +37,7 @@ impl NonHolonomic {
     pub fn reset(&mut self, vehicle: &Vehicle, model: &CostModel) {
         if self.made_for != Some((*vehicle, *model)) {
             self.made_for = Some((*vehicle, *model));
+            self.per_metre = PER_METRE / vehicle.scale();
             self.table.clear();
             self.table.resize(SIDE * (HALF + 1) * HEADINGS, f32::NAN);
         }
@@ -47,7 +50,8 @@ impl NonHolonomic {
         let (y, heading) =
             if pose.y < 0.0 { (-pose.y, -pose.heading) } else { (pose.y, pose.heading) };
         // Truncation of what is not negative: cheaper than rounding without SSE 4.1.
-        let (x, y_bin) = (pose.x * PER_METRE + HALF as f64 + 0.5, y * PER_METRE + 0.5);
+        let per_metre = self.per_metre;
+        let (x, y_bin) = (pose.x * per_metre + HALF as f64 + 0.5, y * per_metre + 0.5);
         let (ix, iy) = (x as usize, y_bin as usize);
         let start = Pose::default();
         if x < 0.0 || ix >= SIDE || iy > HALF {
@@ -62,8 +66,8 @@ impl NonHolonomic {
             return f64::from(stored);
         }
         let center = Pose::new(
-            (ix as f64 - HALF as f64) / PER_METRE,
-            iy as f64 / PER_METRE,
+            (ix as f64 - HALF as f64) / per_metre,
+            iy as f64 / per_metre,
             ih as f64 / HEADINGS as f64 * TAU,
         );
         let cost = least_curve_cost(start, center, vehicle, model, &mut self.words) as f32;

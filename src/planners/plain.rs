@@ -9,7 +9,7 @@
 //! (`joint.rs`); where that fails the search goes on.
 
 use super::analytic::GoalSet;
-use super::config::{HybridAStarConfig, Resolution};
+use super::config::{Attempt, HybridAStarConfig};
 use super::search::Search;
 use super::{Budget, NoPath, PlanResult, Planner, Problem, joint};
 use crate::curves::Path;
@@ -30,14 +30,13 @@ impl PlainHybridAStar {
     /// One search at one resolution.
     fn search(
         &mut self,
-        resolution: &Resolution,
+        attempt: Attempt,
         problem: &Problem,
         goal: &GoalSet,
         expansions: &mut usize,
     ) -> Result<Path, NoPath> {
-        let Self { config, search } = self;
-        let domain = config.domain(problem, problem.start, goal.pose);
-        search.begin(config, resolution, problem, domain, problem.start, goal);
+        let (config, search) = (attempt.config, &mut self.search);
+        search.begin(attempt, problem, problem.start, goal);
         while let Some(node) = search.pop() {
             if config.goal_region.contains(problem.start, search.pose(node)) {
                 let (way, entry) = search.way(node);
@@ -63,11 +62,15 @@ impl Planner for PlainHybridAStar {
     }
 
     fn plan(&mut self, problem: &Problem, budget: Budget) -> PlanResult {
-        let config = self.config;
+        let config = match self.config.for_search(&problem.vehicle) {
+            Ok(config) => config,
+            Err(reason) => return PlanResult::none(reason, 0),
+        };
         let goal = config.goal_set(problem);
+        let domains = config.domains(problem, problem.start, problem.goal);
         let mut left = budget.max_expansions;
-        let path = config.coarse_to_fine(&mut left, |resolution, left| {
-            self.search(resolution, problem, &goal, left)
+        let path = config.coarse_to_fine(&domains, &mut left, |attempt, left| {
+            self.search(attempt, problem, &goal, left)
         });
         let expansions = budget.max_expansions - left;
         match path {

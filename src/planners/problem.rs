@@ -29,6 +29,9 @@ pub struct Problem {
     pub collision: CollisionWorld,
     /// Clearance that plans keep from obstacles, metres: see [`Problem::with_margin`].
     pub margin: f64,
+    /// The clearance asked for, metres: kept as well where start and goal do not force a way
+    /// nearer to something.
+    pub wanted_margin: f64,
 }
 
 /// A problem that has no solution by its own data.
@@ -52,8 +55,9 @@ pub enum ProblemError {
 }
 
 impl Problem {
-    /// Clearance that plans keep from obstacles where start and goal allow it, metres.
-    /// Room for consumers that interpolate sampled poses linearly.
+    /// Clearance that plans keep from obstacles where start and goal allow it, metres; in
+    /// proportion less for vehicles shorter than the default one. Room for consumers that
+    /// interpolate sampled poses linearly.
     pub const MARGIN: f64 = 0.005;
 
     /// The largest margin that can be asked for, metres.
@@ -131,9 +135,11 @@ impl Problem {
         bounds: Option<[Vec2; 4]>,
         margin: f64,
     ) -> Result<Problem, ProblemError> {
-        let mut margin = margin.max(Self::MARGIN);
+        let least = Self::MARGIN * vehicle.scale().min(1.0);
+        let mut margin = if margin > Self::MARGIN { margin } else { least };
+        let wanted_margin = margin;
         let mut collision = CollisionWorld::new(&obstacles, bounds, &vehicle, margin);
-        for smaller in Self::margins_below(margin) {
+        for smaller in Self::margins_below(margin, least) {
             if collision.pose_is_free(start) && collision.pose_is_free(goal) {
                 break;
             }
@@ -146,13 +152,23 @@ impl Problem {
         if !collision.pose_is_free(goal) {
             return Err(ProblemError::GoalInCollision(goal.into()));
         }
-        Ok(Problem { vehicle, frame, kind, start, goal, obstacles, collision, margin })
+        Ok(Problem {
+            vehicle,
+            frame,
+            kind,
+            start,
+            goal,
+            obstacles,
+            collision,
+            margin,
+            wanted_margin,
+        })
     }
 
     /// What is tried in turn where start or goal does not allow `margin`, metres.
-    fn margins_below(margin: f64) -> impl Iterator<Item = f64> {
+    fn margins_below(margin: f64, least: f64) -> impl Iterator<Item = f64> {
         let centimetres = (1..100).rev().map(|cm| f64::from(cm) / 100.0);
-        centimetres.chain([Self::MARGIN]).filter(move |&m| m < margin).chain([0.0])
+        centimetres.chain([least]).filter(move |&m| m < margin).chain([0.0])
     }
 
     /// Gears in which a straight may enter the spot: the goal of a bay is the *set* of

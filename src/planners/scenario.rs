@@ -31,8 +31,8 @@ impl ScenarioHybridAStar {
         let plain = self.search.goal_set(problem);
         let mut goal = plain.clone();
         for exit in exit_manoeuvre::exits(problem) {
-            let cost = &self.search.config().cost;
-            goal.add_preparatory(exit.pose, exit.way_in, &problem.vehicle, cost);
+            let cost = self.search.cost(&problem.vehicle);
+            goal.add_preparatory(exit.pose, exit.way_in, &problem.vehicle, &cost);
         }
         if let Some(leg) = self.search.direct(problem, start, &goal) {
             return Ok(leg);

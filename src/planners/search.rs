@@ -11,7 +11,7 @@ use crate::vehicle::{Gear, Vehicle};
 use crate::world::collision::{BodyFrame, Sweep};
 
 use super::analytic::GoalSet;
-use super::config::{HybridAStarConfig, Resolution};
+use super::config::{Attempt, HybridAStarConfig, Resolution};
 use super::cost::{CostModel, DriveState};
 use super::cost_to_go::CostToGo;
 use super::lattice::Lattice;
@@ -66,6 +66,8 @@ pub(super) struct Search {
     enclosed: bool,
     /// Expansions since a curve was last tried.
     since_curve: u32,
+    /// A curve is tried once in so much estimated cost, which falls due with every expansion.
+    per_curve: f32,
 }
 
 /// What the estimate of the cost from the start to a pose is made of.
@@ -91,28 +93,23 @@ impl Search {
         Self { open, guides: Some(guides), ..Self::default() }
     }
 
-    /// Starts a search from `goal` to `start` within `domain`.
-    pub fn begin(
-        &mut self,
-        config: &HybridAStarConfig,
-        resolution: &Resolution,
-        problem: &Problem,
-        domain: Aabb,
-        start: Pose,
-        goal: &GoalSet,
-    ) {
+    /// Starts a search from `goal` to `start`.
+    pub fn begin(&mut self, attempt: Attempt, problem: &Problem, start: Pose, goal: &GoalSet) {
+        let Attempt { config, resolution, domain, careful } = attempt;
         let vehicle = &problem.vehicle;
         self.start = start;
+        self.per_curve = 4.0 * vehicle.scale() as f32;
         if let Some(guides) = &mut self.guides {
             guides.reset(problem);
         }
-        self.weight = config.heuristic_weight as f32;
+        // A careful search has lost its way once: it follows its estimates more greedily.
+        self.weight = config.heuristic_weight as f32 * if careful { 2.0 } else { 1.0 };
         self.nodes.clear();
         self.open.clear();
         self.since_curve = 0;
         self.lattice.reset(&domain, resolution.cell, resolution.headings);
         self.nonholonomic.reset(vehicle, &config.cost);
-        self.cost_to_go.reset(&domain, config.cost_to_go_cell, vehicle, start);
+        self.cost_to_go.reset(&domain, config.cost_to_go_cell, careful, vehicle, start);
         self.prepare_primitives(resolution, vehicle, problem.collision.footprint());
         let distance = self.cost_to_go.distance(goal.pose.position(), &problem.collision);
         self.enclosed = !distance.is_finite();
@@ -170,7 +167,7 @@ impl Search {
     /// always close to it.
     pub fn wants_curve(&mut self, node: NodeIndex) -> bool {
         self.since_curve += 1;
-        let wants = self.since_curve as f32 * 4.0 >= self.nodes[node as usize].to_come;
+        let wants = self.since_curve as f32 * self.per_curve >= self.nodes[node as usize].to_come;
         if wants {
             self.since_curve = 0;
         }

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use crate::curves::{Path, Segment};
 use crate::geometry::{Pose, Vec2};
 use crate::planners::hybrid_astar::{Entry, GoalSet, Leg};
-use crate::planners::library::{Library, LibrarySearch, Verdicts};
+use crate::planners::library::{Library, LibraryPlan, LibrarySearch, Verdicts};
 use crate::planners::{
     Budget, Guidance, HybridAStar, HybridAStarConfig, NoPath, PlanResult, Planner, Problem, Route,
 };
@@ -32,6 +32,15 @@ const LIBRARIES: usize = 6;
 /// Known manoeuvres, free in the scene, that `n3p` tries to join before it asks for the curve
 /// straight to the goal, and then once more for something cheaper: most plans take the first.
 const FIRST_TRIES: usize = 16;
+/// How often it asks for something cheaper than the best it found, and by which share at least.
+const BETTER: usize = 3;
+const GAIN: f64 = 0.02;
+/// A plan that costs at most so many times an estimate of the best is taken as it is, as long as
+/// nearness to obstacles adds no more than this share.
+const ENOUGH: f64 = 1.1;
+const NEARNESS: f64 = 0.1;
+/// Expansions for something better than a plan that was known.
+const PATIENCE: usize = 500;
 /// Those it tries where there is no such curve. Each takes some microseconds, together they take a
 /// quarter of what a search usually does; generated scenes need 24 of them at most.
 const TRIES: usize = 64;
@@ -135,29 +144,38 @@ impl GuidedPlanner {
         }
     }
 
-    /// The plan by a manoeuvre of the library prepared last. Where the first free ones cannot be
-    /// joined, one curve straight to the goal is asked for, too, and the cheaper plan taken.
-    fn look_up(&mut self, problem: &Problem) -> Attempt {
+    /// The cheapest of what is known without a search: manoeuvres of the library prepared last, and
+    /// the curve straight to the goal.
+    fn look_up(&mut self, problem: &Problem, goal: &GoalSet) -> Option<Known> {
         let Self { libraries, library_search, verdicts, hars, .. } = self;
-        let cost = hars.config().cost;
+        let cost = hars.cost(&problem.vehicle);
         verdicts.clear();
         let any = f64::INFINITY;
         let mut look_up = library_search.look_up(&libraries[0].1, verdicts, problem, &cost, any);
-        let plan = look_up.next(any, FIRST_TRIES);
-        let mut direct = None;
-        let plan = plan.or_else(|| {
-            direct = hars.direct(problem, problem.start, &hars.goal_set(problem));
-            match &direct {
-                Some(leg) => look_up.next(leg.cost, FIRST_TRIES),
-                None => look_up.next(any, TRIES).or_else(|| look_up.long_way(any, LONG_WAYS)),
+        let least = look_up.least_estimate();
+        let mut plan = look_up.next(any, FIRST_TRIES);
+        let direct = hars.direct_below(problem, problem.start, goal, plan_cost(&plan));
+        if direct.is_none() && plan.is_none() {
+            plan = look_up.next(any, TRIES).or_else(|| look_up.long_way(any, LONG_WAYS));
+        }
+        // What is estimated to cost less than the best so far may do so.
+        let mut bound = direct.as_ref().map_or(plan_cost(&plan), |leg| leg.cost);
+        for _ in 0..BETTER {
+            let Some(better) = look_up.next(bound * (1.0 - GAIN), FIRST_TRIES) else { break };
+            bound = better.cost;
+            plan = Some(better);
+        }
+        match (plan, direct) {
+            (Some(plan), direct) if direct.as_ref().is_none_or(|d| plan.cost < d.cost) => {
+                let LibraryPlan { path, cost, preparatory, .. } = plan;
+                let guidance = Guidance { preparatory: Some(preparatory), route: Route::Library };
+                Some(Known { path, cost, guidance, least })
             }
-        });
-        let (path, preparatory, route) = match (plan, direct) {
-            (Some(plan), _) => (plan.path, Some(plan.preparatory), Route::Library),
-            (None, Some(leg)) => (leg.path, None, Route::Direct),
-            (None, None) => return None,
-        };
-        Some((path, Guidance { preparatory, route }))
+            (_, direct) => direct.map(|Leg { path, cost, .. }| {
+                let guidance = Guidance { preparatory: None, route: Route::Direct };
+                Known { path, cost, guidance, least }
+            }),
+        }
     }
 
     /// Puts the library for `problem` first, prepared if need be, and says whether it knows
@@ -170,8 +188,8 @@ impl GuidedPlanner {
             None => {
                 let (vehicle, footprint) = (&problem.vehicle, *problem.collision.footprint());
                 let manoeuvres = self.selector.manoeuvres(kind, vehicle);
-                let cost = &self.hars.config().cost;
-                let library = Library::new(&manoeuvres, vehicle, footprint, cost);
+                let cost = self.hars.cost(vehicle);
+                let library = Library::new(&manoeuvres, vehicle, footprint, &cost);
                 self.libraries.truncate(LIBRARIES - 1);
                 self.libraries.insert(0, (kind, library));
             }
@@ -201,6 +219,18 @@ impl GuidedPlanner {
         Some((path, Guidance { preparatory: Some(pose), route }))
     }
 
+    /// The plan, or the curve straight to the goal where that costs less: a car that is nearly
+    /// parked is not sent back to a preparatory pose.
+    fn or_direct(&mut self, problem: &Problem, planned: (Path, Guidance)) -> (Path, Guidance) {
+        let vehicle = &problem.vehicle;
+        let cost = self.hars.cost(vehicle).path(vehicle, &planned.0.segments);
+        let goal = self.hars.goal_set(problem);
+        match self.hars.direct_below(problem, problem.start, &goal, cost) {
+            Some(leg) => (leg.path, Guidance { preparatory: None, route: Route::Direct }),
+            None => planned,
+        }
+    }
+
     /// From the start to `pose` and from there to the goal of the cell.
     fn two_legs(
         &mut self,
@@ -222,18 +252,18 @@ impl GuidedPlanner {
         config: RankedConfig,
         left: &mut usize,
     ) -> Result<(Path, Guidance), NoPath> {
-        let has_library = config.library && self.prepare_library(problem);
-        if has_library && let Some(planned) = self.look_up(problem) {
-            return Ok(planned);
-        }
         let mut goal = self.hars.goal_set(problem);
+        let has_library = config.library && self.prepare_library(problem);
+        if has_library && let Some(known) = self.look_up(problem, &goal) {
+            return Ok(self.settle(problem, &goal, known, left));
+        }
         for found in self.cells(problem).iter().take(config.abstractions) {
             self.select(problem, found, config.candidates);
             let of_cell = self.hars.goal_set_of_cell(problem, found.shift);
             for i in 0..self.poses.len() {
                 let pose = self.poses[i];
                 if let Some((pose, rest)) = self.feasible(problem, pose, &of_cell) {
-                    let cost = self.hars.config().cost;
+                    let cost = self.hars.cost(&problem.vehicle);
                     goal.add_preparatory(pose, rest, &problem.vehicle, &cost);
                 }
             }
@@ -248,14 +278,43 @@ impl GuidedPlanner {
         if let Some(untried) = untried
             && let Some(leg) = self.hars.direct(problem, problem.start, untried)
         {
-            return Ok((leg.path, guidance(untried.entries().get(leg.entry), Route::Direct)));
+            let guidance = guidance(untried.entries().get(leg.entry), Route::Direct);
+            let plain = self.hars.goal_set(problem);
+            let known = Known { path: leg.path, cost: leg.cost, guidance, least: 0.0 };
+            return Ok(self.settle(problem, &plain, known, left));
         }
         // One search: it begins at the goal and at every preparatory pose.
+        let before = *left;
         let leg = self.hars.search(problem, problem.start, &goal, None, left)?;
         let entry = goal.entries().get(leg.entry);
         let by_way = entry.is_some_and(|e| e.preparatory);
         let route = if by_way { Route::Searched } else { Route::Fallback };
-        Ok((leg.path, guidance(entry, route)))
+        let guidance = guidance(entry, route);
+        let plain = self.hars.goal_set(problem);
+        let patience = PATIENCE.max(before - *left);
+        Ok((self.hars.refine(problem, &plain, leg.path, patience, left), guidance))
+    }
+
+    /// The plan by what is known: as it is where it costs little more than it must, else refined.
+    fn settle(
+        &mut self,
+        problem: &Problem,
+        goal: &GoalSet,
+        known: Known,
+        left: &mut usize,
+    ) -> (Path, Guidance) {
+        let Known { path, cost, mut guidance, least } = known;
+        let enough = ENOUGH * least.max(self.hars.lower_bound(problem, goal));
+        if cost <= enough && self.hars.cost_of(problem, &path) <= cost + NEARNESS * cost {
+            return (path, guidance);
+        }
+        let before = *left;
+        let refined = self.hars.refine(problem, goal, path.clone(), PATIENCE, left);
+        if refined != path {
+            let route = if *left == before { Route::Direct } else { Route::Searched };
+            guidance = Guidance { preparatory: None, route };
+        }
+        (refined, guidance)
     }
 
     /// `pose`, or one beside it, from which a curve leads to the goal, and that curve.
@@ -280,7 +339,8 @@ impl GuidedPlanner {
             (-0.4, 0.0, 0.0),
         ];
         NUDGES.iter().find_map(|&(along, across, turn)| {
-            let p = pose.point_to_parent(Vec2::new(along, across));
+            let scale = problem.vehicle.scale();
+            let p = pose.point_to_parent(Vec2::new(along, across) * scale);
             let nudged = Pose::new(p.x, p.y, pose.heading + turn);
             if !problem.collision.pose_is_free(nudged) {
                 return None;
@@ -302,6 +362,19 @@ impl GuidedPlanner {
     }
 }
 
+/// A plan that took no search.
+struct Known {
+    path: Path,
+    cost: f64,
+    guidance: Guidance,
+    /// An estimate of what the best plan costs.
+    least: f64,
+}
+
+fn plan_cost(plan: &Option<LibraryPlan>) -> f64 {
+    plan.as_ref().map_or(f64::INFINITY, |plan| plan.cost)
+}
+
 /// A path and how it came about, or none.
 type Attempt = Option<(Path, Guidance)>;
 
@@ -314,25 +387,45 @@ impl Planner for GuidedPlanner {
         let mut left = budget.max_expansions;
         let planned = match self.strategy {
             Strategy::Paper => match self.plan_paper(problem, &mut left) {
-                Some(planned) => Ok(planned),
+                Some(planned) => Ok(self.or_direct(problem, planned)),
                 None => self.fall_back(problem, &mut left),
             },
             Strategy::Ranked(config) => self.plan_ranked(problem, config, &mut left),
         };
-        let expansions = budget.max_expansions - left;
         match planned {
-            Ok((path, mut guidance)) => {
-                if guidance.route == Route::Fallback {
-                    guidance.route = match problem.kind {
-                        None => Route::NoSpot,
-                        Some(_) if self.cells(problem).is_empty() => Route::NoLane,
-                        Some(_) => Route::Fallback,
-                    };
+            Ok((path, guidance)) => {
+                let result = self.certify(problem, path, guidance, budget, left);
+                // A refused candidate is not the end: a search may still find a way.
+                if result.outcome == Err(NoPath::Uncertified)
+                    && let Ok((path, guidance)) = self.fall_back(problem, &mut left)
+                {
+                    return self.certify(problem, path, guidance, budget, left);
                 }
-                let result = PlanResult::certified(problem, path, expansions);
-                PlanResult { guidance: Some(guidance), ..result }
+                result
             }
-            Err(reason) => PlanResult::none(reason, expansions),
+            Err(reason) => PlanResult::none(reason, budget.max_expansions - left),
         }
+    }
+}
+
+impl GuidedPlanner {
+    /// The result with `path`, which is checked.
+    fn certify(
+        &self,
+        problem: &Problem,
+        path: Path,
+        mut guidance: Guidance,
+        budget: Budget,
+        left: usize,
+    ) -> PlanResult {
+        if guidance.route == Route::Fallback {
+            guidance.route = match problem.kind {
+                None => Route::NoSpot,
+                Some(_) if self.cells(problem).is_empty() => Route::NoLane,
+                Some(_) => Route::Fallback,
+            };
+        }
+        let result = PlanResult::certified(problem, path, budget.max_expansions - left);
+        PlanResult { guidance: Some(guidance), ..result }
     }
 }

@@ -44,7 +44,12 @@ impl Source<'_> {
     fn library(&self, manoeuvres: &[Vec<Segment>]) -> Library {
         let Metadata { vehicle, planner, .. } = self.metadata;
         let own: Vec<_> = manoeuvres.iter().map(|m| scaled(m, self.unit)).collect();
-        Library::new(&own, vehicle, vehicle.footprint(Problem::MARGIN), &planner.cost)
+        Library::new(
+            &own,
+            vehicle,
+            vehicle.footprint(Problem::MARGIN),
+            &planner.cost.scaled(vehicle.scale()),
+        )
     }
 }
 
@@ -161,7 +166,7 @@ fn ending(
     sample: &Sample,
     problem: &Problem,
 ) -> Option<(Vec<Segment>, f64)> {
-    let (vehicle, model) = (&problem.vehicle, hars.config().cost);
+    let (vehicle, model) = (&problem.vehicle, hars.cost(&problem.vehicle));
     let known = known_ending(sample, problem)?;
     let begin = known.iter().rev().fold(problem.goal, |pose, s| s.reversed().end(pose));
     let mut goal = GoalSet::single(problem.goal);

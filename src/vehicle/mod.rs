@@ -155,6 +155,13 @@ impl Vehicle {
         check("backward_speed", self.backward_speed, is_speed(self.backward_speed), speeds)
     }
 
+    /// How many times as long as the default vehicle. Lengths in planners' settings are those
+    /// for the default vehicle and are scaled by this for others, so that a plan does not depend
+    /// on the unit of length.
+    pub fn scale(&self) -> f64 {
+        self.length / Self::default().length
+    }
+
     /// Largest curvature, 1/m.
     pub fn max_curvature(&self) -> f64 {
         self.max_steer.tan() / self.wheelbase

@@ -10,6 +10,7 @@
 
 mod centres;
 mod shortest;
+mod tidy;
 mod words;
 
 use self::centres::UnitGoal;
@@ -40,6 +41,11 @@ impl Word {
         self.segments().iter().map(|s| s.length.abs()).sum()
     }
 
+    /// The shortest segment, metres; infinite for the word without segments.
+    pub fn shortest_segment(&self) -> f64 {
+        self.segments().iter().map(|s| s.length.abs()).fold(f64::INFINITY, f64::min)
+    }
+
     /// Its name: turn (`L`, `S`, `R`) and gear (`+`, `-`) per segment, such as `L+R-S-`.
     pub fn name(&self) -> String {
         let turn = |s: &Segment| match s.curvature {
@@ -52,11 +58,30 @@ impl Word {
     }
 }
 
-/// All words from `from` to `to` that exist, unsorted, appended to `out` (at most 48).
+/// Lateral offsets below this (metres) and turns below this (radians) are those of rounding: the
+/// way is straight.
+const STRAIGHT: f64 = 5e-7;
+
+/// All words from `from` to `to` that exist, unsorted, appended to `out` (at most 49).
 ///
-/// `radius`: turning radius, metres. Every arc turns by at most π.
+/// `radius`: turning radius, metres. Every arc turns by at most π. Where the poses lie on one line
+/// up to rounding, the straight comes first, exact to a micrometre, and where they coincide, the
+/// word without segments is the only one: the formulas would mend the rounding by arcs of
+/// millimetres.
 pub fn words(from: Pose, to: Pose, radius: f64, out: &mut Vec<Word>) {
     let first = out.len();
+    let seen = from.relative(to);
+    if seen.y.abs() < STRAIGHT && seen.heading.abs() < STRAIGHT.min(STRAIGHT / radius) {
+        let mut word = Word::default();
+        if seen.x.abs() >= STRAIGHT {
+            word.segments[0] = Segment::straight(seen.x);
+            word.len = 1;
+        }
+        out.push(word);
+        if word.len == 0 {
+            return;
+        }
+    }
     enumerate(UnitGoal::new(from, to, radius), &mut Collect { radius, out });
     if out.len() == first {
         // Only when the poses coincide: the formulas give words of length zero or none.

@@ -77,11 +77,17 @@ impl CollisionWorld {
         if !pose.is_finite() || self.bounds.as_ref().is_some_and(|b| !b.contains(pose.position())) {
             return false;
         }
+        self.is_free_of(&self.footprint, pose)
+    }
+
+    /// Whether another footprint than this world's touches nothing at `pose`; the bounds are not
+    /// looked at.
+    pub fn is_free_of(&self, footprint: &Aabb, pose: Pose) -> bool {
         let body = BodyFrame::new(pose);
-        let near = body.aabb_of(&self.footprint);
-        let touches = self.index.first_near(&near, |a, b| {
-            segment_in_box(body.local(a), body.local(b), &self.footprint)
-        });
+        let near = body.aabb_of(footprint);
+        let touches = self
+            .index
+            .first_near(&near, |a, b| segment_in_box(body.local(a), body.local(b), footprint));
         // No edge touches the footprint, so it lies wholly inside or outside each polygon.
         touches.is_none() && !self.index.is_in_polygon(pose.position())
     }
@@ -102,6 +108,12 @@ impl CollisionWorld {
 
     fn stays_in_bounds(&self, start: &BodyFrame, sweep: &Sweep) -> bool {
         self.bounds.as_ref().is_none_or(|b| b.contains_motion(start.pose, sweep.segment()))
+    }
+
+    /// Whether a sweep of any footprint, free at its start, touches nothing; the bounds are not
+    /// looked at.
+    pub fn is_swept_free(&self, start: &BodyFrame, sweep: &Sweep) -> bool {
+        self.contact(start, sweep).is_none()
     }
 
     /// Some contact of the motion with an obstacle; the bounds are not looked at.

@@ -1,0 +1,93 @@
+//! What nearness to obstacles costs along a path.
+//!
+//! The last term of the cost model: metres driven with something nearer than is comfortable.
+//! A footprint grown by that distance is swept like the car's own; where it touches, the motion
+//! is halved until the pieces are short. Around start and goal nothing is charged: there the
+//! distance is given.
+
+use crate::curves::{Path, Segment};
+use crate::geometry::{Aabb, Pose};
+use crate::world::collision::{BodyFrame, Sweep};
+
+use super::Problem;
+use super::cost::CostModel;
+
+/// Pieces that are not halved any more, metres (for the default vehicle).
+const PIECE: f64 = 0.5;
+/// Nothing is charged within so many vehicle lengths of the start and of the goal.
+const AROUND_START: f64 = 0.2;
+const AROUND_GOAL: f64 = 0.4;
+/// How much more it costs to be nearer than the margin that was asked for.
+const WITHIN_MARGIN: f64 = 8.0;
+
+/// Prices nearness in one problem.
+pub(super) struct Nearness<'a> {
+    problem: &'a Problem,
+    footprint: Aabb,
+    /// Per metre; 0 where nothing is charged at all.
+    weight: f64,
+    piece: f64,
+}
+
+impl<'a> Nearness<'a> {
+    /// For paths of `problem`; `model` is that of its vehicle.
+    pub fn new(problem: &'a Problem, model: &CostModel) -> Self {
+        let vehicle = &problem.vehicle;
+        let scale = vehicle.scale();
+        let wanted = problem.wanted_margin;
+        let (distance, weight) = if wanted > problem.margin {
+            (wanted, WITHIN_MARGIN * model.clearance)
+        } else {
+            (model.near, model.clearance)
+        };
+        let weight = if distance > problem.margin { weight } else { 0.0 };
+        let footprint = vehicle.footprint(distance);
+        Self { problem, footprint, weight, piece: PIECE * scale }
+    }
+
+    /// What a whole path costs more for being near.
+    pub fn of_path(&self, path: &Path) -> f64 {
+        if self.weight == 0.0 {
+            return 0.0;
+        }
+        path.legs().map(|(from, segment)| self.of_motion(from, segment)).sum()
+    }
+
+    /// What motions from `from` cost more for being near.
+    pub fn of_motions(&self, mut from: Pose, segments: &[Segment]) -> f64 {
+        let mut total = 0.0;
+        for &s in segments {
+            total += self.of_motion(from, s);
+            from = s.end(from);
+        }
+        total
+    }
+
+    /// What one motion costs more for being near.
+    pub fn of_motion(&self, from: Pose, segment: Segment) -> f64 {
+        if self.weight == 0.0 { 0.0 } else { self.weight * self.near_metres(from, segment) }
+    }
+
+    fn near_metres(&self, from: Pose, segment: Segment) -> f64 {
+        let world = &self.problem.collision;
+        let length = segment.length.abs();
+        let is_free = world.is_free_of(&self.footprint, from)
+            && world.is_swept_free(&BodyFrame::new(from), &Sweep::new(&self.footprint, segment));
+        if is_free {
+            return 0.0;
+        }
+        if length <= self.piece {
+            let middle = segment.at(from, segment.length / 2.0);
+            return if self.is_given(middle) { 0.0 } else { length };
+        }
+        let half = Segment { length: segment.length / 2.0, ..segment };
+        self.near_metres(from, half) + self.near_metres(half.end(from), half)
+    }
+
+    /// Whether a pose is so close to start or goal that its distances are theirs.
+    fn is_given(&self, pose: Pose) -> bool {
+        let Problem { start, goal, vehicle, .. } = self.problem;
+        pose.distance(*start) < AROUND_START * vehicle.length
+            || pose.distance(*goal) < AROUND_GOAL * vehicle.length
+    }
+}
