@@ -15,12 +15,14 @@ use super::analytic::{AnalyticExpansion, GoalSet};
 use super::cost::{CostModel, DriveState};
 use super::nearness::Nearness;
 
-/// Nodes along the path, at most.
-const ALONG: usize = 20;
+/// Nodes along the path, about.
+const ALONG: f64 = 10.0;
 /// Nodes beside it, at most.
 const BESIDE: usize = 16;
 /// Gains below this share of the cost are not worth a curve.
-const GAIN: f64 = 0.005;
+const GAIN: f64 = 0.02;
+/// A curve costs at least so much more than its length: it turns, and steers for it.
+const TURNING: f64 = 1.02;
 /// Times the corners are cut.
 const ROUNDS: usize = 2;
 
@@ -60,7 +62,7 @@ impl Shortcuts {
         for _ in 0..ROUNDS {
             let shorter = self.round(problem, goal, model, &nearness, &best.1);
             let cost = whole(&shorter);
-            if cost >= best.0 * (1.0 - GAIN) || !problem.collision.path_is_free(&shorter) {
+            if cost >= best.0 * (1.0 - GAIN / 2.0) || !problem.collision.path_is_free(&shorter) {
                 break;
             }
             best = (cost, shorter);
@@ -170,7 +172,7 @@ impl Shortcuts {
         path: &Path,
     ) {
         let vehicle = &problem.vehicle;
-        let spacing = (path.length() / ALONG as f64 * 1.5).max(0.2 * vehicle.turning_radius());
+        let spacing = (path.length() / ALONG).max(0.4 * vehicle.turning_radius());
         self.nodes.clear();
         let (mut state, mut cost, mut at) = (DriveState::PARKED, 0.0, 0.0);
         let start = Node { pose: path.start, at, cost, arrival: state, from: None };
@@ -236,7 +238,7 @@ fn state_after(last: Option<&Segment>, before: DriveState, vehicle: &Vehicle) ->
 
 /// Whether the shortest curve may cost less than `room`.
 fn is_worth_it(from: Pose, to: Pose, vehicle: &Vehicle, model: &CostModel, room: f64) -> bool {
-    let per_metre = model.forward.min(model.backward);
+    let per_metre = model.forward.min(model.backward) * TURNING;
     from.distance(to) * per_metre < room
         && reeds_shepp::shortest_length(from, to, vehicle.turning_radius()) * per_metre < room
 }

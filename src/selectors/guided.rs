@@ -35,12 +35,16 @@ const FIRST_TRIES: usize = 16;
 /// How often it asks for something cheaper than the best it found, and by which share at least.
 const BETTER: usize = 3;
 const GAIN: f64 = 0.02;
-/// A plan that costs at most so many times an estimate of the best is taken as it is, as long as
+/// A plan that costs at most so many times the estimate of the best known one (which knows nothing
+/// of joints and obstacles) or the least cost through empty space is taken as it is, as long as
 /// nearness to obstacles adds no more than this share.
+const USUAL: f64 = 1.3;
 const ENOUGH: f64 = 1.1;
-const NEARNESS: f64 = 0.1;
+const NEARNESS: f64 = 0.15;
+/// Changes of direction that it often takes to turn into a bay nose first, which no estimate knows.
+const TO_AND_FRO: usize = 2;
 /// Expansions for something better than a plan that was known.
-const PATIENCE: usize = 500;
+const PATIENCE: usize = 60;
 /// Those it tries where there is no such curve. Each takes some microseconds, together they take a
 /// quarter of what a search usually does; generated scenes need 24 of them at most.
 const TRIES: usize = 64;
@@ -304,8 +308,15 @@ impl GuidedPlanner {
         left: &mut usize,
     ) -> (Path, Guidance) {
         let Known { path, cost, mut guidance, least } = known;
-        let enough = ENOUGH * least.max(self.hars.lower_bound(problem, goal));
-        if cost <= enough && self.hars.cost_of(problem, &path) <= cost + NEARNESS * cost {
+        // What is known of the spot says what it takes; where that is little, the curve through
+        // empty space does.
+        let usual = match problem.kind {
+            Some(ParkingType::Forward) if path.direction_changes() <= TO_AND_FRO => f64::INFINITY,
+            _ => USUAL * least,
+        };
+        if (cost <= usual || cost <= ENOUGH * self.hars.lower_bound(problem, goal))
+            && self.hars.cost_of(problem, &path) <= (1.0 + NEARNESS) * cost
+        {
             return (path, guidance);
         }
         let before = *left;
