@@ -13,6 +13,8 @@ use crate::curves::reeds_shepp::{self, Word};
 use crate::geometry::Pose;
 use crate::vehicle::Vehicle;
 
+use crate::world::collision::Contact;
+
 use super::Problem;
 use super::cost::{CostModel, DriveState};
 
@@ -162,6 +164,8 @@ pub(super) struct AnalyticExpansion {
     candidates: BinaryHeap<Candidate>,
     /// Entries whose words were not asked for yet, the most promising last.
     waiting: Vec<Waiting>,
+    /// What the last word that was not free touched.
+    suspect: Option<Contact>,
 }
 
 /// A word by its number in `words`; ordered so that the heap pops the cheapest, of equals the
@@ -251,7 +255,8 @@ impl AnalyticExpansion {
             } else {
                 let c = self.candidates.pop()?;
                 let word = self.words[c.word as usize];
-                if problem.collision.segments_are_free(from, word.segments()) {
+                let world = &problem.collision;
+                if world.segments_are_free_of(&mut self.suspect, from, word.segments()) {
                     let entry_index = c.target as usize;
                     let entry = &goal.entries[entry_index];
                     return Some(Connection { from, word, entry, entry_index, cost: c.cost });
@@ -296,7 +301,8 @@ impl AnalyticExpansion {
         self.add(&curves, to, departure, 0, |cost| (cost < bound).then_some(cost));
         while let Some(c) = self.candidates.pop() {
             let word = self.words[c.word as usize];
-            if problem.collision.segments_are_free(from, word.segments()) {
+            let world = &problem.collision;
+            if world.segments_are_free_of(&mut self.suspect, from, word.segments()) {
                 return Some((word, c.cost));
             }
         }

@@ -101,6 +101,21 @@ impl HybridAStar {
         self.config.cost.scaled(vehicle.scale())
     }
 
+    /// The ways into the goal of a problem like this that are no manoeuvres: nothing at all, and the
+    /// straights, free or not.
+    pub(crate) fn entry_straights(&self, problem: &Problem) -> Vec<Vec<Segment>> {
+        let config = self.config.for_vehicle(&problem.vehicle);
+        let mut entries = vec![Vec::new()];
+        if config.entry_straight {
+            let steps = (config.entry_max / config.entry_step + 1e-9).clamp(0.0, 1000.0) as u32;
+            for gear in problem.entry_gears() {
+                let length = |i| gear.sign() * f64::from(i) * config.entry_step;
+                entries.extend((1..=steps).map(|i| vec![Segment::straight(length(i))]));
+            }
+        }
+        entries
+    }
+
     /// [`HybridAStar::goal_set`] that also has the entries of a cell whose goal lies `shift`
     /// metres further out.
     pub(crate) fn goal_set_of_cell(&self, problem: &Problem, shift: f64) -> GoalSet {
@@ -274,11 +289,9 @@ impl HybridAStar {
         Some(Leg { path, cost: way_cost + cost, entry })
     }
 
-    /// What driving `path` costs, nearness included.
-    pub(crate) fn cost_of(&self, problem: &Problem, path: &Path) -> f64 {
-        let model = self.cost(&problem.vehicle);
-        let nearness = Nearness::new(problem, &model);
-        model.path(&problem.vehicle, &path.segments) + nearness.of_path(path)
+    /// Whether `path` passes something nearer than is comfortable, away from start and goal.
+    pub(crate) fn passes_near(&self, problem: &Problem, path: &Path) -> bool {
+        Nearness::new(problem, &self.cost(&problem.vehicle)).is_met_on_the_way(path)
     }
 
     /// What any path into `goal` costs at least, obstacles aside.

@@ -17,6 +17,8 @@ const PIECE: f64 = 0.5;
 /// Nothing is charged within so many vehicle lengths of the start and of the goal.
 const AROUND_START: f64 = 0.2;
 const AROUND_GOAL: f64 = 0.4;
+/// Farther from the goal than so many vehicle lengths the car is on its way.
+const ON_THE_WAY: f64 = 2.0;
 /// How much more it costs to be nearer than the margin that was asked for.
 const WITHIN_MARGIN: f64 = 8.0;
 
@@ -51,6 +53,27 @@ impl<'a> Nearness<'a> {
             return 0.0;
         }
         path.legs().map(|(from, segment)| self.of_motion(from, segment)).sum()
+    }
+
+    /// Whether something is near where the car has left the start and is not yet at the spot.
+    pub fn is_met_on_the_way(&self, path: &Path) -> bool {
+        let Problem { start, goal, vehicle, collision, .. } = self.problem;
+        let is_on_the_way = |pose: Pose| {
+            pose.distance(*start) > AROUND_START * vehicle.length
+                && pose.distance(*goal) > ON_THE_WAY * vehicle.length
+        };
+        let is_near = |(from, s): (Pose, Segment)| {
+            // From the middle on: the first motion begins at the start.
+            let half = Segment { length: s.length / 2.0, ..s };
+            let middle = half.end(from);
+            is_on_the_way(middle)
+                && !(collision.is_free_of(&self.footprint, middle)
+                    && collision
+                        .is_swept_free(&BodyFrame::new(middle), &Sweep::new(&self.footprint, half)))
+        };
+        // Who asked for a margin wants it wherever it can be kept.
+        let must = self.weight > 0.0 && self.problem.wanted_margin > self.problem.margin;
+        must && self.of_path(path) > 0.0 || self.weight > 0.0 && path.legs().any(is_near)
     }
 
     /// What motions from `from` cost more for being near.

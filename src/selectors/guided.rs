@@ -32,15 +32,14 @@ const LIBRARIES: usize = 6;
 /// Known manoeuvres, free in the scene, that `n3p` tries to join before it asks for the curve
 /// straight to the goal, and then once more for something cheaper: most plans take the first.
 const FIRST_TRIES: usize = 16;
-/// How often it asks for something cheaper than the best it found, and by which share at least.
-const BETTER: usize = 3;
-const GAIN: f64 = 0.02;
+/// Those it tries for something cheaper than the best it found, and by which share at least.
+const BETTER: usize = 4;
+const GAIN: f64 = 0.1;
 /// A plan that costs at most so many times the estimate of the best known one (which knows nothing
-/// of joints and obstacles) or the least cost through empty space is taken as it is, as long as
-/// nearness to obstacles adds no more than this share.
+/// of joints and obstacles) or the least cost through empty space is taken as it is, unless it
+/// passes something near on its way.
 const USUAL: f64 = 1.3;
 const ENOUGH: f64 = 1.1;
-const NEARNESS: f64 = 0.15;
 /// Changes of direction that it often takes to turn into a bay nose first, which no estimate knows.
 const TO_AND_FRO: usize = 2;
 /// Expansions for something better than a plan that was known.
@@ -97,7 +96,7 @@ pub struct GuidedPlanner {
     poses: Vec<Pose>,
     /// The selector's manoeuvres, prepared for the parking types and footprints met last, the
     /// latest first.
-    libraries: Vec<(ParkingType, Library)>,
+    libraries: Vec<Prepared>,
     library_search: LibrarySearch,
     verdicts: Verdicts,
 }
@@ -149,56 +148,61 @@ impl GuidedPlanner {
     }
 
     /// The cheapest of what is known without a search: manoeuvres of the library prepared last, and
-    /// the curve straight to the goal.
+    /// the curve straight to the goal where none of the first can be joined.
     fn look_up(&mut self, problem: &Problem, goal: &GoalSet) -> Option<Known> {
         let Self { libraries, library_search, verdicts, hars, .. } = self;
         let cost = hars.cost(&problem.vehicle);
+        let Prepared { library, straights, .. } = &libraries[0];
         verdicts.clear();
         let any = f64::INFINITY;
-        let mut look_up = library_search.look_up(&libraries[0].1, verdicts, problem, &cost, any);
+        let mut look_up = library_search.look_up(library, verdicts, problem, &cost, any);
         let least = look_up.least_estimate();
-        let mut plan = look_up.next(any, FIRST_TRIES);
-        let direct = hars.direct_below(problem, problem.start, goal, plan_cost(&plan));
-        if direct.is_none() && plan.is_none() {
-            plan = look_up.next(any, TRIES).or_else(|| look_up.long_way(any, LONG_WAYS));
+        let by_manoeuvre = |plan: LibraryPlan| {
+            let is_straight = plan.manoeuvre >= *straights;
+            let preparatory = (!is_straight).then_some(plan.preparatory);
+            let route = if is_straight { Route::Direct } else { Route::Library };
+            let guidance = Guidance { preparatory, route };
+            Known { path: plan.path, cost: plan.cost, guidance, least }
+        };
+        let mut best = look_up.next(any, FIRST_TRIES).map(by_manoeuvre);
+        if best.is_none() {
+            let guidance = Guidance { preparatory: None, route: Route::Direct };
+            let direct = hars.direct(problem, problem.start, goal);
+            let direct = direct.map(|Leg { path, cost, .. }| Known { path, cost, guidance, least });
+            let bound = direct.as_ref().map_or(any, |known| known.cost);
+            let tries = if direct.is_some() { FIRST_TRIES } else { TRIES };
+            best = look_up.next(bound, tries).map(by_manoeuvre).or(direct);
+            best = best.or_else(|| look_up.long_way(any, LONG_WAYS).map(by_manoeuvre));
         }
         // What is estimated to cost less than the best so far may do so.
-        let mut bound = direct.as_ref().map_or(plan_cost(&plan), |leg| leg.cost);
-        for _ in 0..BETTER {
-            let Some(better) = look_up.next(bound * (1.0 - GAIN), FIRST_TRIES) else { break };
-            bound = better.cost;
-            plan = Some(better);
+        while let Some(known) = &best
+            && let Some(better) = look_up.next(known.cost * (1.0 - GAIN), BETTER)
+        {
+            best = Some(by_manoeuvre(better));
         }
-        match (plan, direct) {
-            (Some(plan), direct) if direct.as_ref().is_none_or(|d| plan.cost < d.cost) => {
-                let LibraryPlan { path, cost, preparatory, .. } = plan;
-                let guidance = Guidance { preparatory: Some(preparatory), route: Route::Library };
-                Some(Known { path, cost, guidance, least })
-            }
-            (_, direct) => direct.map(|Leg { path, cost, .. }| {
-                let guidance = Guidance { preparatory: None, route: Route::Direct };
-                Known { path, cost, guidance, least }
-            }),
-        }
+        best
     }
 
-    /// Puts the library for `problem` first, prepared if need be, and says whether it knows
-    /// anything.
+    /// Puts the library for `problem` first, prepared if need be, and says whether there is one.
     fn prepare_library(&mut self, problem: &Problem) -> bool {
         let Some(kind) = problem.kind else { return false };
-        let fits = |(k, l): &(ParkingType, Library)| *k == kind && l.fits(problem);
+        let fits = |p: &Prepared| p.kind == kind && p.library.fits(problem);
         match self.libraries.iter().position(fits) {
             Some(at) => self.libraries[..=at].rotate_right(1),
             None => {
                 let (vehicle, footprint) = (&problem.vehicle, *problem.collision.footprint());
                 let manoeuvres = self.selector.manoeuvres(kind, vehicle);
                 let cost = self.hars.cost(vehicle);
-                let library = Library::new(&manoeuvres, vehicle, footprint, &cost);
+                let mut library = Library::new(&manoeuvres, vehicle, footprint, &cost);
+                let straights = library.len();
+                for entry in self.hars.entry_straights(problem) {
+                    library.add(entry, &cost);
+                }
                 self.libraries.truncate(LIBRARIES - 1);
-                self.libraries.insert(0, (kind, library));
+                self.libraries.insert(0, Prepared { kind, library, straights });
             }
         }
-        !self.libraries[0].1.is_empty()
+        self.libraries[0].straights > 0
     }
 
     /// The cells found around the spot, the largest first.
@@ -315,7 +319,7 @@ impl GuidedPlanner {
             _ => USUAL * least,
         };
         if (cost <= usual || cost <= ENOUGH * self.hars.lower_bound(problem, goal))
-            && self.hars.cost_of(problem, &path) <= (1.0 + NEARNESS) * cost
+            && !self.hars.passes_near(problem, &path)
         {
             return (path, guidance);
         }
@@ -373,6 +377,15 @@ impl GuidedPlanner {
     }
 }
 
+/// A library made ready for a parking type and a footprint.
+struct Prepared {
+    kind: ParkingType,
+    library: Library,
+    /// From this number on its manoeuvres are none but the straight into the spot, or nothing at
+    /// all: what joins them is the curve straight to the goal.
+    straights: usize,
+}
+
 /// A plan that took no search.
 struct Known {
     path: Path,
@@ -380,10 +393,6 @@ struct Known {
     guidance: Guidance,
     /// An estimate of what the best plan costs.
     least: f64,
-}
-
-fn plan_cost(plan: &Option<LibraryPlan>) -> f64 {
-    plan.as_ref().map_or(f64::INFINITY, |plan| plan.cost)
 }
 
 /// A path and how it came about, or none.

@@ -148,6 +148,17 @@ impl CollisionWorld {
     ///
     /// The last segments are checked first: near the goal space is tightest.
     pub fn segments_are_free(&self, start: Pose, segments: &[Segment]) -> bool {
+        self.segments_are_free_of(&mut None, start, segments)
+    }
+
+    /// [`CollisionWorld::segments_are_free`] for many ways in turn; `suspect` as in
+    /// [`CollisionWorld::sweep_is_free_of`].
+    pub fn segments_are_free_of(
+        &self,
+        suspect: &mut Option<Contact>,
+        start: Pose,
+        segments: &[Segment],
+    ) -> bool {
         // More than a curve has: those beyond are checked in driving order.
         let mut starts = [Pose::default(); 8];
         let (segments, beyond) = segments.split_at(segments.len().min(starts.len()));
@@ -157,8 +168,12 @@ impl CollisionWorld {
             pose = s.end(pose);
         }
         let legs = starts.iter().zip(segments);
-        legs.rev().all(|(&from, &s)| self.segment_is_free(from, s))
-            && (beyond.is_empty() || self.segments_are_free(pose, beyond))
+        let mut is_free = |(&from, &s): (&Pose, &Segment)| {
+            let sweep = Sweep::new(&self.footprint, s);
+            self.sweep_is_free_of(suspect, &BodyFrame::new(from), &sweep)
+        };
+        legs.rev().all(&mut is_free)
+            && (beyond.is_empty() || self.segments_are_free_of(suspect, pose, beyond))
     }
 
     /// Whether the whole path, its start included, touches nothing.
