@@ -311,7 +311,8 @@ impl HybridAStar {
         left: &mut usize,
     ) -> Path {
         let model = self.cost(&problem.vehicle);
-        let (path, cost) = self.shortcuts.cut(problem, goal, &model, path);
+        let estimates = self.queue.curve_estimates(&problem.vehicle, &model);
+        let (path, cost) = self.shortcuts.cut(problem, &model, estimates, path);
         if cost <= ENOUGH * self.lower_bound(problem, goal) {
             return path;
         }
@@ -326,7 +327,8 @@ impl HybridAStar {
         let _ = self.improve(attempt, problem, goal, &mut best, &mut spend);
         *left -= share - spend;
         let Some(found) = best.filter(|leg| leg.path != path) else { return path };
-        let (found, found_cost) = self.shortcuts.cut(problem, goal, &model, found.path);
+        let estimates = self.queue.curve_estimates(&problem.vehicle, &model);
+        let (found, found_cost) = self.shortcuts.cut(problem, &model, estimates, found.path);
         if found_cost < cost { found } else { path }
     }
 

@@ -185,9 +185,11 @@ impl Candidate {
     }
 
     /// The cost up to which a plan by this candidate is preferred to the next one's: one more
-    /// change of gear and some steering than estimated.
-    fn window(self, model: &CostModel) -> f64 {
-        self.estimate() + 4.0 / 3.0 * model.gear_change
+    /// change of gear and some steering than estimated. Two more for the straight into the spot:
+    /// that is what a car near its goal needs for a correction.
+    fn window(self, library: &Library, model: &CostModel) -> f64 {
+        let is_straight = library.manoeuvres[self.index()].entry.rest.len() < 2;
+        self.estimate() + if is_straight { 8.0 } else { 4.0 } / 3.0 * model.gear_change
     }
 }
 
@@ -239,9 +241,10 @@ impl LibrarySearch {
 }
 
 impl LookUp<'_> {
-    /// The least estimate of all manoeuvres that were not looked at yet, free or not.
-    pub fn least_estimate(&self) -> f64 {
-        self.search.queue.peek().map_or(f64::INFINITY, |Reverse(c)| c.estimate())
+    /// The least estimate of the first `count` manoeuvres that were not looked at yet, free or not.
+    pub fn least_estimate(&self, count: usize) -> f64 {
+        let left = self.search.queue.iter().filter(|Reverse(c)| c.index() < count);
+        left.min_by_key(|Reverse(c)| *c).map_or(f64::INFINITY, |Reverse(c)| c.estimate())
     }
 
     /// The next plan in order of estimated cost that is free, costs less than `bound` and little
@@ -258,7 +261,8 @@ impl LookUp<'_> {
             self.search.queue.pop();
             if self.verdicts.is_free(self.library, candidate.index(), self.problem) {
                 self.search.free.push(candidate);
-                let plan = self.join(candidate, bound.min(candidate.window(self.model)));
+                let window = candidate.window(self.library, self.model);
+                let plan = self.join(candidate, bound.min(window));
                 if plan.is_some() {
                     return plan;
                 }
@@ -273,7 +277,11 @@ impl LookUp<'_> {
         let tries = tries.min(self.search.free.len());
         (0..tries).find_map(|i| {
             let candidate = self.search.free[i];
-            if candidate.window(self.model) < bound { self.join(candidate, bound) } else { None }
+            if candidate.window(self.library, self.model) < bound {
+                self.join(candidate, bound)
+            } else {
+                None
+            }
         })
     }
 

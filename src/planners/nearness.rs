@@ -57,16 +57,12 @@ impl<'a> Nearness<'a> {
 
     /// Whether something is near where the car has left the start and is not yet at the spot.
     pub fn is_met_on_the_way(&self, path: &Path) -> bool {
-        let Problem { start, goal, vehicle, collision, .. } = self.problem;
-        let is_on_the_way = |pose: Pose| {
-            pose.distance(*start) > AROUND_START * vehicle.length
-                && pose.distance(*goal) > ON_THE_WAY * vehicle.length
-        };
+        let collision = &self.problem.collision;
         let is_near = |(from, s): (Pose, Segment)| {
             // From the middle on: the first motion begins at the start.
             let half = Segment { length: s.length / 2.0, ..s };
             let middle = half.end(from);
-            is_on_the_way(middle)
+            self.is_on_the_way(middle)
                 && !(collision.is_free_of(&self.footprint, middle)
                     && collision
                         .is_swept_free(&BodyFrame::new(middle), &Sweep::new(&self.footprint, half)))
@@ -74,6 +70,15 @@ impl<'a> Nearness<'a> {
         // Who asked for a margin wants it wherever it can be kept.
         let must = self.weight > 0.0 && self.problem.wanted_margin > self.problem.margin;
         must && self.of_path(path) > 0.0 || self.weight > 0.0 && path.legs().any(is_near)
+    }
+
+    /// Whether the car has left the start and is not yet at the spot. Who asked for a margin is on
+    /// the way all the time.
+    pub fn is_on_the_way(&self, pose: Pose) -> bool {
+        let Problem { start, goal, vehicle, margin, wanted_margin, .. } = self.problem;
+        let around = if wanted_margin > margin { AROUND_GOAL } else { ON_THE_WAY };
+        pose.distance(*start) > AROUND_START * vehicle.length
+            && pose.distance(*goal) > around * vehicle.length
     }
 
     /// What motions from `from` cost more for being near.

@@ -148,6 +148,12 @@ impl Search {
         }
     }
 
+    /// Estimates of curves for `vehicle` and the cost `model`.
+    pub fn curve_estimates(&mut self, vehicle: &Vehicle, model: &CostModel) -> &mut NonHolonomic {
+        self.nonholonomic.reset(vehicle, model);
+        &mut self.nonholonomic
+    }
+
     /// Takes the open node of least f that is still the best of its state.
     pub fn pop(&mut self) -> Option<NodeIndex> {
         let Self { nodes, lattice, open, .. } = self;

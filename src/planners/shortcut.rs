@@ -6,14 +6,15 @@
 //! path's own pieces as the ways already known, is found by dynamic programming. Nothing gets
 //! worse, and the work is bounded by the number of nodes.
 
-use crate::curves::{Path, Segment, reeds_shepp};
+use crate::curves::{Path, Segment};
 use crate::geometry::{Pose, Vec2};
 use crate::vehicle::Vehicle;
 
 use super::Problem;
-use super::analytic::{AnalyticExpansion, GoalSet};
+use super::analytic::AnalyticExpansion;
 use super::cost::{CostModel, DriveState};
 use super::nearness::Nearness;
+use super::nonholonomic::NonHolonomic;
 
 /// Nodes along the path, about.
 const ALONG: f64 = 10.0;
@@ -21,8 +22,9 @@ const ALONG: f64 = 10.0;
 const BESIDE: usize = 16;
 /// Gains below this share of the cost are not worth a curve.
 const GAIN: f64 = 0.02;
-/// A curve costs at least so much more than its length: it turns, and steers for it.
-const TURNING: f64 = 1.02;
+/// What an estimate of a curve's cost may be too high by: a share, and metres for its coarse steps.
+const ESTIMATE: f64 = 0.95;
+const SLACK: f64 = 0.3;
 /// Times the corners are cut.
 const ROUNDS: usize = 2;
 
@@ -47,12 +49,13 @@ struct Node {
 }
 
 impl Shortcuts {
-    /// `path` or a cheaper one to the same goal, and its cost with nearness.
+    /// `path` or a cheaper one to the same goal, and its cost with nearness. `estimates` are those
+    /// of `model`.
     pub fn cut(
         &mut self,
         problem: &Problem,
-        goal: &GoalSet,
         model: &CostModel,
+        estimates: &mut NonHolonomic,
         path: Path,
     ) -> (Path, f64) {
         let nearness = Nearness::new(problem, model);
@@ -60,7 +63,7 @@ impl Shortcuts {
             |path: &Path| model.path(&problem.vehicle, &path.segments) + nearness.of_path(path);
         let mut best = (whole(&path), path);
         for _ in 0..ROUNDS {
-            let shorter = self.round(problem, goal, model, &nearness, &best.1);
+            let shorter = self.round(problem, model, estimates, &nearness, &best.1);
             let cost = whole(&shorter);
             if cost >= best.0 * (1.0 - GAIN / 2.0) || !problem.collision.path_is_free(&shorter) {
                 break;
@@ -73,8 +76,8 @@ impl Shortcuts {
     fn round(
         &mut self,
         problem: &Problem,
-        goal: &GoalSet,
         model: &CostModel,
+        estimates: &mut NonHolonomic,
         nearness: &Nearness,
         path: &Path,
     ) -> Path {
@@ -82,14 +85,17 @@ impl Shortcuts {
         self.place_nodes(problem, model, nearness, path);
         let last = self.nodes.len() - 1;
         let least = GAIN * self.nodes[last].cost;
+        let slack = SLACK * vehicle.scale();
         for to in 1..=last {
             for from in 0..to {
                 let before = &self.nodes[from];
                 let room = self.nodes[to].cost - before.cost - least;
                 let target = self.nodes[to].pose;
-                if !before.cost.is_finite()
-                    || !is_worth_it(before.pose, target, vehicle, model, room)
-                {
+                if room <= 0.0 || before.pose.distance(target) >= room {
+                    continue;
+                }
+                let seen = before.pose.relative(target);
+                if estimates.cost(seen, vehicle, model) * ESTIMATE - slack >= room {
                     continue;
                 }
                 let (pose, state) = (before.pose, before.arrival);
@@ -104,28 +110,6 @@ impl Shortcuts {
                 );
                 if let Some((word, cost)) = curve {
                     self.offer(to, from, word.segments().to_vec(), cost, nearness, vehicle);
-                }
-            }
-        }
-        // The goal's entries: curves that end before it, and the rest.
-        for entry in goal.entries().iter().filter(|e| !e.rest.is_empty()) {
-            for from in 0..last {
-                let before = &self.nodes[from];
-                let room = self.nodes[last].cost - before.cost - entry.cost() - least;
-                if !before.cost.is_finite()
-                    || !is_worth_it(before.pose, entry.pose, vehicle, model, room)
-                {
-                    continue;
-                }
-                let (pose, state) = (before.pose, before.arrival);
-                let departure = entry.departure();
-                let curve = self
-                    .analytic
-                    .curve_after(state, pose, entry.pose, departure, room, problem, model);
-                if let Some((word, cost)) = curve {
-                    let mut way = word.segments().to_vec();
-                    way.extend(entry.rest.iter().copied());
-                    self.offer(last, from, way, cost + entry.cost(), nearness, vehicle);
                 }
             }
         }
@@ -188,8 +172,8 @@ impl Shortcuts {
                     model.segment(state, piece.length, vehicle.steer(s.curvature));
                 let near = nearness.of_motion(begin, piece);
                 let middle = at + piece.length.abs() / 2.0;
-                if near > 0.0 && beside.len() < BESIDE {
-                    let middle_pose = piece.at(begin, piece.length / 2.0);
+                let middle_pose = piece.at(begin, piece.length / 2.0);
+                if near > 0.0 && beside.len() < BESIDE && nearness.is_on_the_way(middle_pose) {
                     for side in [-2.0, -1.0, 1.0, 2.0] {
                         let across = Vec2::new(0.0, side * model.near);
                         let p = middle_pose.point_to_parent(across);
@@ -234,11 +218,4 @@ impl Shortcuts {
 /// Gear and steering after the last motion of a way.
 fn state_after(last: Option<&Segment>, before: DriveState, vehicle: &Vehicle) -> DriveState {
     last.map_or(before, |s| DriveState { gear: Some(s.gear()), steer: vehicle.steer(s.curvature) })
-}
-
-/// Whether the shortest curve may cost less than `room`.
-fn is_worth_it(from: Pose, to: Pose, vehicle: &Vehicle, model: &CostModel, room: f64) -> bool {
-    let per_metre = model.forward.min(model.backward) * TURNING;
-    from.distance(to) * per_metre < room
-        && reeds_shepp::shortest_length(from, to, vehicle.turning_radius()) * per_metre < room
 }

@@ -156,7 +156,7 @@ impl GuidedPlanner {
         verdicts.clear();
         let any = f64::INFINITY;
         let mut look_up = library_search.look_up(library, verdicts, problem, &cost, any);
-        let least = look_up.least_estimate();
+        let least = look_up.least_estimate(*straights);
         let by_manoeuvre = |plan: LibraryPlan| {
             let is_straight = plan.manoeuvre >= *straights;
             let preparatory = (!is_straight).then_some(plan.preparatory);
