@@ -98,6 +98,13 @@ impl Resolution {
     }
 }
 
+impl Resolution {
+    /// Strides twice as long: a long way round takes a quarter of the states.
+    fn doubled(&self) -> Self {
+        Self { cell: 2.0 * self.cell, step: 2.0 * self.step, ..*self }
+    }
+}
+
 impl Default for HybridAStarConfig {
     fn default() -> Self {
         Self {
@@ -215,7 +222,8 @@ impl HybridAStarConfig {
     /// are left their share even when a coarse one goes on and on.
     ///
     /// On each lattice the domain grows while there is no way within it; and a search that does
-    /// not come to an end soon begins anew, careful of gaps that the car does not pass.
+    /// not come to an end soon begins anew, careful of gaps that the car does not pass and, on the
+    /// coarsest lattice, in strides twice as long.
     pub(super) fn coarse_to_fine<T>(
         &self,
         domains: &[Aabb],
@@ -242,7 +250,13 @@ impl HybridAStarConfig {
                     Err(NoPath::Enclosed | NoPath::Exhausted) if grows => domain += 1,
                     Err(NoPath::BudgetSpent) => {
                         domain += usize::from(grows);
-                        let again = Attempt { domain: domains[domain], careful: true, ..first };
+                        let strides = resolution.doubled();
+                        let again = Attempt {
+                            resolution: if i == 0 { &strides } else { resolution },
+                            domain: domains[domain],
+                            careful: true,
+                            ..first
+                        };
                         result = search(again, expansions);
                         if !matches!(result, Err(NoPath::Enclosed | NoPath::Exhausted))
                             || domain + 1 == domains.len()

@@ -34,6 +34,8 @@ pub struct HybridAStar {
     queue: Search,
     analytic: AnalyticExpansion,
     shortcuts: Shortcuts,
+    /// Looks for something cheaper than a plan: several queues find other ways soonest.
+    improver: Search,
     words: Vec<Word>,
     /// Whether plans are refined.
     refines: bool,
@@ -71,6 +73,7 @@ impl HybridAStar {
             queue: Search::default(),
             analytic: AnalyticExpansion::default(),
             shortcuts: Shortcuts::default(),
+            improver: Search::guided(Guides::new(config.multi_heuristic)),
             words: Vec::new(),
             refines: true,
         }
@@ -81,9 +84,10 @@ impl HybridAStar {
         Self { refines: false, ..self }
     }
 
-    /// The first solution found by a search that follows `guides` as well.
-    pub(super) fn guided(config: HybridAStarConfig, guides: Guides) -> Self {
-        Self { queue: Search::guided(guides), ..Self::new(config) }
+    /// The first solution found by a search with several queues (see `multi_heuristic.rs`).
+    pub(crate) fn guided(config: HybridAStarConfig) -> Self {
+        let queue = Search::guided(Guides::new(config.multi_heuristic));
+        Self { queue, ..Self::new(config) }
     }
 
     /// The settings.
@@ -211,6 +215,7 @@ impl HybridAStar {
         expansions: &mut usize,
     ) -> Result<(), NoPath> {
         let mut wanted = self.solutions - usize::from(best.is_some());
+        let model = &attempt.config.cost;
         self.queue.begin(attempt, problem, start, goal);
         while let Some(node) = self.queue.pop() {
             let bound = best.as_ref().map_or(f64::INFINITY, |leg| leg.cost);
@@ -222,7 +227,8 @@ impl HybridAStar {
             }
             *expansions -= 1;
             if self.queue.wants_curve(node)
-                && let Some(leg) = self.close(attempt, problem, start, goal, node, bound)
+                && let Some(leg) =
+                    close(&self.queue, &mut self.analytic, problem, goal, node, bound, model)
             {
                 *best = Some(leg);
                 wanted -= 1;
@@ -244,51 +250,28 @@ impl HybridAStar {
         goal: &GoalSet,
         best: &mut Option<Leg>,
         expansions: &mut usize,
-    ) -> Result<(), NoPath> {
-        let start = problem.start;
-        self.queue.begin(attempt, problem, start, goal);
-        while let Some(node) = self.queue.pop() {
+    ) {
+        let Self { improver, analytic, .. } = self;
+        let model = &attempt.config.cost;
+        improver.begin(attempt, problem, problem.start, goal);
+        while let Some(node) = improver.pop() {
             let bound = best.as_ref().map_or(f64::INFINITY, |leg| leg.cost);
-            if self.queue.estimate(node) * ENOUGH >= bound {
-                return Ok(());
-            }
             if *expansions == 0 {
-                return Err(NoPath::BudgetSpent);
+                return;
             }
             *expansions -= 1;
-            if self.queue.wants_curve(node)
-                && let Some(leg) = self.close(attempt, problem, start, goal, node, bound)
+            // Nothing much cheaper leads through this node.
+            if improver.estimate(node) * ENOUGH >= bound {
+                continue;
+            }
+            if improver.wants_curve(node)
+                && let Some(leg) = close(improver, analytic, problem, goal, node, bound, model)
             {
                 *best = Some(leg);
             }
-            self.queue.expand(node, goal, attempt.config, problem);
+            improver.expand(node, goal, attempt.config, problem);
         }
-        Err(self.queue.stop())
     }
-
-    /// The path by a curve from `start` to `node` and the way on from there, if it is free and costs
-    /// less than `bound`.
-    fn close(
-        &mut self,
-        attempt: Attempt,
-        problem: &Problem,
-        start: Pose,
-        goal: &GoalSet,
-        node: NodeIndex,
-        bound: f64,
-    ) -> Option<Leg> {
-        let departure = self.queue.departure(node, goal);
-        let (to, model) = (self.queue.pose(node), &attempt.config.cost);
-        let way_cost = self.queue.cost(node);
-        let curve = self.analytic.curve(start, to, departure, bound - way_cost, problem, model);
-        let (word, cost) = curve?;
-        let (way, entry) = self.queue.way(node);
-        let mut path = Path::new(start, word.segments().iter().copied());
-        path.extend(way);
-        path.extend(goal.entries()[entry].rest.iter().copied());
-        Some(Leg { path, cost: way_cost + cost, entry })
-    }
-
     /// Whether `path` passes something nearer than is comfortable, away from start and goal.
     pub(crate) fn passes_near(&self, problem: &Problem, path: &Path) -> bool {
         Nearness::new(problem, &self.cost(&problem.vehicle)).is_met_on_the_way(path)
@@ -323,8 +306,7 @@ impl HybridAStar {
         let share = patience.min(*left);
         let mut spend = share;
         let mut best = Some(Leg { path: path.clone(), cost, entry: 0 });
-        // Whatever ends it: what counts is what it found.
-        let _ = self.improve(attempt, problem, goal, &mut best, &mut spend);
+        self.improve(attempt, problem, goal, &mut best, &mut spend);
         *left -= share - spend;
         let Some(found) = best.filter(|leg| leg.path != path) else { return path };
         let estimates = self.queue.curve_estimates(&problem.vehicle, &model);
@@ -418,6 +400,27 @@ impl Planner for HybridAStar {
             Err(reason) => PlanResult::none(reason, expansions),
         }
     }
+}
+
+/// The path by a curve from the start of a search to `node` and the way on from there, if it is free
+/// and costs less than `bound`.
+fn close(
+    queue: &Search,
+    analytic: &mut AnalyticExpansion,
+    problem: &Problem,
+    goal: &GoalSet,
+    node: NodeIndex,
+    bound: f64,
+    model: &CostModel,
+) -> Option<Leg> {
+    let (start, to, departure) = (queue.start(), queue.pose(node), queue.departure(node, goal));
+    let way_cost = queue.cost(node);
+    let (word, cost) = analytic.curve(start, to, departure, bound - way_cost, problem, model)?;
+    let (way, entry) = queue.way(node);
+    let mut path = Path::new(start, word.segments().iter().copied());
+    path.extend(way);
+    path.extend(goal.entries()[entry].rest.iter().copied());
+    Some(Leg { path, cost: way_cost + cost, entry })
 }
 
 /// Index of the segment that the parking manoeuvre begins with.

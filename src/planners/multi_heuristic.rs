@@ -112,7 +112,7 @@ pub struct MultiHeuristicHybridAStar {
 impl MultiHeuristicHybridAStar {
     /// Buffers grow at first use.
     pub fn new(config: HybridAStarConfig) -> Self {
-        Self { search: HybridAStar::guided(config, Guides::new(config.multi_heuristic)) }
+        Self { search: HybridAStar::guided(config) }
     }
 }
 

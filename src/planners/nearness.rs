@@ -26,6 +26,7 @@ const WITHIN_MARGIN: f64 = 8.0;
 pub(super) struct Nearness<'a> {
     problem: &'a Problem,
     footprint: Aabb,
+    distance: f64,
     /// Per metre; 0 where nothing is charged at all.
     weight: f64,
     piece: f64,
@@ -44,7 +45,12 @@ impl<'a> Nearness<'a> {
         };
         let weight = if distance > problem.margin { weight } else { 0.0 };
         let footprint = vehicle.footprint(distance);
-        Self { problem, footprint, weight, piece: PIECE * scale }
+        Self { problem, footprint, distance, weight, piece: PIECE * scale }
+    }
+
+    /// What is near, metres.
+    pub fn distance(&self) -> f64 {
+        self.distance
     }
 
     /// What a whole path costs more for being near.

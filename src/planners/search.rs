@@ -191,6 +191,11 @@ impl Search {
         f64::from(n.cost + n.to_come)
     }
 
+    /// Where the path is to start.
+    pub fn start(&self) -> Pose {
+        self.start
+    }
+
     /// The pose of `node`.
     pub fn pose(&self, node: NodeIndex) -> Pose {
         self.nodes[node as usize].pose

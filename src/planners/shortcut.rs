@@ -19,7 +19,7 @@ use super::nonholonomic::NonHolonomic;
 /// Nodes along the path, about.
 const ALONG: f64 = 10.0;
 /// Nodes beside it, at most.
-const BESIDE: usize = 16;
+const BESIDE: usize = 24;
 /// Gains below this share of the cost are not worth a curve.
 const GAIN: f64 = 0.02;
 /// What an estimate of a curve's cost may be too high by: a share, and metres for its coarse steps.
@@ -175,7 +175,7 @@ impl Shortcuts {
                 let middle_pose = piece.at(begin, piece.length / 2.0);
                 if near > 0.0 && beside.len() < BESIDE && nearness.is_on_the_way(middle_pose) {
                     for side in [-2.0, -1.0, 1.0, 2.0] {
-                        let across = Vec2::new(0.0, side * model.near);
+                        let across = Vec2::new(0.0, side * nearness.distance());
                         let p = middle_pose.point_to_parent(across);
                         let pose = Pose::new(p.x, p.y, middle_pose.heading);
                         if problem.collision.pose_is_free(pose) {

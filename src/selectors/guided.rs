@@ -40,10 +40,8 @@ const GAIN: f64 = 0.1;
 /// passes something near on its way.
 const USUAL: f64 = 1.3;
 const ENOUGH: f64 = 1.1;
-/// Changes of direction that it often takes to turn into a bay nose first, which no estimate knows.
-const TO_AND_FRO: usize = 2;
 /// Expansions for something better than a plan that was known.
-const PATIENCE: usize = 60;
+const PATIENCE: usize = 200;
 /// Those it tries where there is no such curve. Each takes some microseconds, together they take a
 /// quarter of what a search usually does; generated scenes need 24 of them at most.
 const TRIES: usize = 64;
@@ -127,7 +125,10 @@ impl GuidedPlanner {
             name: name.to_owned(),
             strategy,
             selector,
-            hars: HybridAStar::new(config),
+            hars: match strategy {
+                Strategy::Paper => HybridAStar::new(config),
+                Strategy::Ranked(_) => HybridAStar::guided(config),
+            },
             poses: Vec::new(),
             libraries: Vec::new(),
             library_search: LibrarySearch::default(),
@@ -314,11 +315,7 @@ impl GuidedPlanner {
         let Known { path, cost, mut guidance, least } = known;
         // What is known of the spot says what it takes; where that is little, the curve through
         // empty space does.
-        let usual = match problem.kind {
-            Some(ParkingType::Forward) if path.direction_changes() <= TO_AND_FRO => f64::INFINITY,
-            _ => USUAL * least,
-        };
-        if (cost <= usual || cost <= ENOUGH * self.hars.lower_bound(problem, goal))
+        if (cost <= USUAL * least || cost <= ENOUGH * self.hars.lower_bound(problem, goal))
             && !self.hars.passes_near(problem, &path)
         {
             return (path, guidance);
