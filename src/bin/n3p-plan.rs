@@ -127,8 +127,8 @@ fn plan(args: &Args) -> Result<ExitCode> {
     }
     if problem.margin < args.margin {
         tracing::warn!(
-            "start or goal is nearer to an obstacle than --margin {}: the whole path may come as \
-             near as {} m",
+            "start or goal is nearer to an obstacle than --margin {}: the path may come as near as \
+             {} m to that obstacle",
             args.margin,
             problem.margin
         );

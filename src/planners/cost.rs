@@ -22,8 +22,7 @@ pub struct CostModel {
     pub steer: f64,
     /// Per radian of |Δδ| between segments.
     pub steer_change: f64,
-    /// Per metre driven nearer to an obstacle than `near`; where a margin that was asked for is not
-    /// kept because of start or goal, eight times as much within it.
+    /// Per metre driven nearer to an obstacle than `near`.
     pub clearance: f64,
     /// What is near, metres.
     pub near: f64,

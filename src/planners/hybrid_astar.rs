@@ -43,8 +43,8 @@ pub struct HybridAStar {
 
 /// A plan that costs at most so many times what it must cost at least is good enough.
 const ENOUGH: f64 = 1.1;
-/// Expansions that may be spent on something better than a known plan, at least; as many as the
-/// plan took where that is more.
+/// Expansions that may be spent on something better than a known plan, at least; twice as many
+/// as the plan took where that is more.
 const PATIENCE: usize = 400;
 
 /// What one search found.
@@ -391,7 +391,7 @@ impl Planner for HybridAStar {
         let leg = self.leg(problem, problem.start, &goal, &mut left);
         let spent = budget.max_expansions - left;
         let path = leg.map(|leg| match self.refines {
-            true => self.refine(problem, &goal, leg.path, spent.max(PATIENCE), &mut left),
+            true => self.refine(problem, &goal, leg.path, PATIENCE.max(2 * spent), &mut left),
             false => leg.path,
         });
         let expansions = budget.max_expansions - left;

@@ -19,8 +19,6 @@ const AROUND_START: f64 = 0.2;
 const AROUND_GOAL: f64 = 0.4;
 /// Farther from the goal than so many vehicle lengths the car is on its way.
 const ON_THE_WAY: f64 = 2.0;
-/// How much more it costs to be nearer than the margin that was asked for.
-const WITHIN_MARGIN: f64 = 8.0;
 
 /// Prices nearness in one problem.
 pub(super) struct Nearness<'a> {
@@ -37,13 +35,12 @@ impl<'a> Nearness<'a> {
     pub fn new(problem: &'a Problem, model: &CostModel) -> Self {
         let vehicle = &problem.vehicle;
         let scale = vehicle.scale();
-        let wanted = problem.wanted_margin;
-        let (distance, weight) = if wanted > problem.margin {
-            (wanted, WITHIN_MARGIN * model.clearance)
+        let distance = model.near;
+        let weight = if vehicle.footprint(distance).max.x > problem.collision.footprint().max.x {
+            model.clearance
         } else {
-            (model.near, model.clearance)
+            0.0
         };
-        let weight = if distance > problem.margin { weight } else { 0.0 };
         let footprint = vehicle.footprint(distance);
         Self { problem, footprint, distance, weight, piece: PIECE * scale }
     }
@@ -73,18 +70,14 @@ impl<'a> Nearness<'a> {
                     && collision
                         .is_swept_free(&BodyFrame::new(middle), &Sweep::new(&self.footprint, half)))
         };
-        // Who asked for a margin wants it wherever it can be kept.
-        let must = self.weight > 0.0 && self.problem.wanted_margin > self.problem.margin;
-        must && self.of_path(path) > 0.0 || self.weight > 0.0 && path.legs().any(is_near)
+        self.weight > 0.0 && path.legs().any(is_near)
     }
 
-    /// Whether the car has left the start and is not yet at the spot. Who asked for a margin is on
-    /// the way all the time.
+    /// Whether the car has left the start and is not yet at the spot.
     pub fn is_on_the_way(&self, pose: Pose) -> bool {
-        let Problem { start, goal, vehicle, margin, wanted_margin, .. } = self.problem;
-        let around = if wanted_margin > margin { AROUND_GOAL } else { ON_THE_WAY };
+        let Problem { start, goal, vehicle, .. } = self.problem;
         pose.distance(*start) > AROUND_START * vehicle.length
-            && pose.distance(*goal) > around * vehicle.length
+            && pose.distance(*goal) > ON_THE_WAY * vehicle.length
     }
 
     /// What motions from `from` cost more for being near.

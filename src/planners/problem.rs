@@ -29,9 +29,6 @@ pub struct Problem {
     pub collision: CollisionWorld,
     /// Clearance that plans keep from obstacles, metres: see [`Problem::with_margin`].
     pub margin: f64,
-    /// The clearance asked for, metres: kept as well where start and goal do not force a way
-    /// nearer to something.
-    pub wanted_margin: f64,
 }
 
 /// A problem that has no solution by its own data.
@@ -77,11 +74,10 @@ impl Problem {
     /// The problem of a scene whose plans keep `margin` metres from obstacles, and
     /// never less than [`Problem::MARGIN`], where start and goal allow it.
     ///
-    /// A plan contains its start and its goal. Where one of them is nearer to an obstacle, less
+    /// A plan contains its start and its goal. From the obstacles that one of them is nearer to, less
     /// is kept along the whole plan: the most whole centimetres that both allow, the usual margin
     /// where that is less than one, and 0 where they do not allow that either. The field `margin`
-    /// says what it came to. Whole centimetres, because planners prepare themselves for every
-    /// footprint they meet.
+    /// says what it came to. From all others the plan keeps what was asked for.
     pub fn with_margin(scene: &Scene, margin: f64) -> Result<Problem, ProblemError> {
         if !(0.0..=Self::MAX_MARGIN).contains(&margin) {
             return Err(ProblemError::Margin(margin));
@@ -137,14 +133,22 @@ impl Problem {
     ) -> Result<Problem, ProblemError> {
         let least = Self::MARGIN * vehicle.scale().min(1.0);
         let mut margin = if margin > Self::MARGIN { margin } else { least };
-        let wanted_margin = margin;
         let mut collision = CollisionWorld::new(&obstacles, bounds, &vehicle, margin);
-        for smaller in Self::margins_below(margin, least) {
-            if collision.pose_is_free(start) && collision.pose_is_free(goal) {
-                break;
+        let ends_are_free =
+            |world: &CollisionWorld| world.pose_is_free(start) && world.pose_is_free(goal);
+        if !ends_are_free(&collision) {
+            // What is next to start or goal keeps the whole plan from the margin, but only from
+            // its own: everything else is kept as far away as was asked for.
+            let alone = |one: &Obstacles, margin| CollisionWorld::new(one, None, &vehicle, margin);
+            let (kept, close) = obstacles.partition(|one| ends_are_free(&alone(one, margin)));
+            let far = CollisionWorld::new(&kept, bounds, &vehicle, margin);
+            for smaller in Self::margins_below(margin, least) {
+                margin = smaller;
+                if ends_are_free(&alone(&close, margin)) {
+                    break;
+                }
             }
-            margin = smaller;
-            collision = collision.with_margin(&vehicle, margin);
+            collision = far.tolerating(&close, &vehicle, margin);
         }
         if !collision.pose_is_free(start) {
             return Err(ProblemError::StartInCollision(start.into()));
@@ -152,17 +156,7 @@ impl Problem {
         if !collision.pose_is_free(goal) {
             return Err(ProblemError::GoalInCollision(goal.into()));
         }
-        Ok(Problem {
-            vehicle,
-            frame,
-            kind,
-            start,
-            goal,
-            obstacles,
-            collision,
-            margin,
-            wanted_margin,
-        })
+        Ok(Problem { vehicle, frame, kind, start, goal, obstacles, collision, margin })
     }
 
     /// What is tried in turn where start or goal does not allow `margin`, metres.

@@ -41,7 +41,7 @@ const GAIN: f64 = 0.1;
 const USUAL: f64 = 1.3;
 const ENOUGH: f64 = 1.1;
 /// Expansions for something better than a plan that was known.
-const PATIENCE: usize = 200;
+const PATIENCE: usize = 400;
 /// Those it tries where there is no such curve. Each takes some microseconds, together they take a
 /// quarter of what a search usually does; generated scenes need 24 of them at most.
 const TRIES: usize = 64;
@@ -300,7 +300,7 @@ impl GuidedPlanner {
         let route = if by_way { Route::Searched } else { Route::Fallback };
         let guidance = guidance(entry, route);
         let plain = self.hars.goal_set(problem);
-        let patience = PATIENCE.max(before - *left);
+        let patience = PATIENCE.max(2 * (before - *left));
         Ok((self.hars.refine(problem, &plain, leg.path, patience, left), guidance))
     }
 

@@ -74,6 +74,24 @@ impl Obstacles {
         &self.points
     }
 
+    /// Those for which `holds`, each asked alone, and the others.
+    pub fn partition(&self, holds: impl Fn(&Obstacles) -> bool) -> (Obstacles, Obstacles) {
+        let mut parts = (Obstacles::default(), Obstacles::default());
+        let mut take = |one: Obstacles| {
+            let part = if holds(&one) { &mut parts.0 } else { &mut parts.1 };
+            part.polygons.extend(one.polygons);
+            part.polylines.extend(one.polylines);
+            part.points.extend(one.points);
+        };
+        let none = Obstacles::default;
+        self.polygons.iter().for_each(|p| take(Obstacles { polygons: vec![p.clone()], ..none() }));
+        self.polylines
+            .iter()
+            .for_each(|l| take(Obstacles { polylines: vec![l.clone()], ..none() }));
+        self.points.iter().for_each(|&p| take(Obstacles { points: vec![p], ..none() }));
+        parts
+    }
+
     /// Whether there is nothing.
     pub fn is_empty(&self) -> bool {
         self.polygons.is_empty() && self.polylines.is_empty() && self.points.is_empty()

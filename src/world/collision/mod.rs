@@ -28,6 +28,14 @@ pub struct CollisionWorld {
     index: EdgeIndex,
     bounds: Option<ConvexBounds>,
     footprint: Aabb,
+    tolerated: Option<Tolerated>,
+}
+
+/// Obstacles that a smaller footprint must keep clear of: those next to a start or a goal.
+#[derive(Clone, Debug)]
+struct Tolerated {
+    index: EdgeIndex,
+    footprint: Aabb,
 }
 
 impl CollisionWorld {
@@ -45,12 +53,15 @@ impl CollisionWorld {
             index: EdgeIndex::new(obstacles),
             bounds: bounds.map(ConvexBounds::new),
             footprint: vehicle.footprint(margin),
+            tolerated: None,
         }
     }
 
-    /// The same obstacles with another margin, metres.
-    pub fn with_margin(self, vehicle: &Vehicle, margin: f64) -> Self {
-        Self { footprint: vehicle.footprint(margin), ..self }
+    /// The same world with more obstacles, from which only `margin` metres are kept, no more than
+    /// from the others.
+    pub fn tolerating(self, obstacles: &Obstacles, vehicle: &Vehicle, margin: f64) -> Self {
+        let (index, footprint) = (EdgeIndex::new(obstacles), vehicle.footprint(margin));
+        Self { tolerated: Some(Tolerated { index, footprint }), ..self }
     }
 
     /// The footprint (margin included) in the vehicle's frame.
@@ -65,10 +76,14 @@ impl CollisionWorld {
 
     /// Calls `visit` with every edge that may come near `area`; points are edges of length zero.
     pub fn edges_near(&self, area: &Aabb, mut visit: impl FnMut(Vec2, Vec2)) {
-        self.index.first_near(area, |a, b| {
-            visit(a, b);
-            false
-        });
+        for index in [Some(&self.index), self.tolerated.as_ref().map(|t| &t.index)] {
+            index.and_then(|index| {
+                index.first_near(area, |a, b| {
+                    visit(a, b);
+                    false
+                })
+            });
+        }
     }
 
     /// Whether the footprint at `pose` touches nothing and its axle is in bounds. A pose that is
@@ -77,19 +92,14 @@ impl CollisionWorld {
         if !pose.is_finite() || self.bounds.as_ref().is_some_and(|b| !b.contains(pose.position())) {
             return false;
         }
-        self.is_free_of(&self.footprint, pose)
+        is_clear(&self.index, &self.footprint, pose)
+            && self.tolerated.as_ref().is_none_or(|t| is_clear(&t.index, &t.footprint, pose))
     }
 
-    /// Whether another footprint than this world's touches nothing at `pose`; the bounds are not
-    /// looked at.
+    /// Whether another footprint than this world's touches nothing at `pose`; neither the bounds
+    /// nor what is tolerated are looked at.
     pub fn is_free_of(&self, footprint: &Aabb, pose: Pose) -> bool {
-        let body = BodyFrame::new(pose);
-        let near = body.aabb_of(footprint);
-        let touches = self
-            .index
-            .first_near(&near, |a, b| segment_in_box(body.local(a), body.local(b), footprint));
-        // No edge touches the footprint, so it lies wholly inside or outside each polygon.
-        touches.is_none() && !self.index.is_in_polygon(pose.position())
+        is_clear(&self.index, footprint, pose)
     }
 
     /// Whether driving `segment` from the free pose `start` touches nothing.
@@ -103,15 +113,27 @@ impl CollisionWorld {
     /// [`CollisionWorld::segment_is_free`] with the sweep of this world's footprint
     /// prepared beforehand, as the search does for its motion primitives.
     pub fn sweep_is_free(&self, start: &BodyFrame, sweep: &Sweep) -> bool {
-        self.stays_in_bounds(start, sweep) && self.contact(start, sweep).is_none()
+        self.stays_in_bounds(start, sweep)
+            && self.contact(start, sweep).is_none()
+            && self.tolerates(start, sweep)
+    }
+
+    /// Whether the motion of `sweep` touches nothing of what is tolerated.
+    fn tolerates(&self, start: &BodyFrame, sweep: &Sweep) -> bool {
+        self.tolerated.as_ref().is_none_or(|t| {
+            let sweep = Sweep::new(&t.footprint, sweep.segment());
+            let near = start.aabb_of(sweep.aabb());
+            let hit = |a, b| sweep.hits(start.local(a), start.local(b));
+            t.index.first_near(&near, hit).is_none()
+        })
     }
 
     fn stays_in_bounds(&self, start: &BodyFrame, sweep: &Sweep) -> bool {
         self.bounds.as_ref().is_none_or(|b| b.contains_motion(start.pose, sweep.segment()))
     }
 
-    /// Whether a sweep of any footprint, free at its start, touches nothing; the bounds are not
-    /// looked at.
+    /// Whether a sweep of any footprint, free at its start, touches nothing; neither the bounds nor
+    /// what is tolerated are looked at.
     pub fn is_swept_free(&self, start: &BodyFrame, sweep: &Sweep) -> bool {
         self.contact(start, sweep).is_none()
     }
@@ -141,7 +163,7 @@ impl CollisionWorld {
         }
         let contact = self.contact(start, sweep);
         *suspect = contact.or(*suspect);
-        contact.is_none() && self.stays_in_bounds(start, sweep)
+        contact.is_none() && self.stays_in_bounds(start, sweep) && self.tolerates(start, sweep)
     }
 
     /// Whether driving all `segments` from the free pose `start` touches nothing.
@@ -182,6 +204,16 @@ impl CollisionWorld {
         self.pose_is_free(path.start)
             && path.legs().all(|(from, s)| is_finite(s) && self.segment_is_free(from, s))
     }
+}
+
+/// Whether `footprint` at `pose` touches no edge of `index` and lies in none of its polygons.
+fn is_clear(index: &EdgeIndex, footprint: &Aabb, pose: Pose) -> bool {
+    let body = BodyFrame::new(pose);
+    let near = body.aabb_of(footprint);
+    let touches =
+        index.first_near(&near, |a, b| segment_in_box(body.local(a), body.local(b), footprint));
+    // No edge touches the footprint, so it lies wholly inside or outside each polygon.
+    touches.is_none() && !index.is_in_polygon(pose.position())
 }
 
 /// A pose with its sine and cosine, to see obstacles from the vehicle.
