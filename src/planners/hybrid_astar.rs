@@ -85,7 +85,7 @@ impl HybridAStar {
     }
 
     /// The first solution found by a search with several queues (see `multi_heuristic.rs`).
-    pub(crate) fn guided(config: HybridAStarConfig) -> Self {
+    pub(super) fn guided(config: HybridAStarConfig) -> Self {
         let queue = Search::guided(Guides::new(config.multi_heuristic));
         Self { queue, ..Self::new(config) }
     }

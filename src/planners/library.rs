@@ -241,10 +241,15 @@ impl LibrarySearch {
 }
 
 impl LookUp<'_> {
-    /// The least estimate of the first `count` manoeuvres that were not looked at yet, free or not.
-    pub fn least_estimate(&self, count: usize) -> f64 {
-        let left = self.search.queue.iter().filter(|Reverse(c)| c.index() < count);
-        left.min_by_key(|Reverse(c)| *c).map_or(f64::INFINITY, |Reverse(c)| c.estimate())
+    /// The least estimate of the first `count` manoeuvres and of the others, of those that were not
+    /// looked at yet, free or not.
+    pub fn least_estimates(&self, count: usize) -> (f64, f64) {
+        let (mut first, mut others) = (f64::INFINITY, f64::INFINITY);
+        for Reverse(candidate) in &self.search.queue {
+            let least = if candidate.index() < count { &mut first } else { &mut others };
+            *least = least.min(candidate.estimate());
+        }
+        (first, others)
     }
 
     /// The next plan in order of estimated cost that is free, costs less than `bound` and little

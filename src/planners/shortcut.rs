@@ -21,7 +21,7 @@ const ALONG: f64 = 10.0;
 /// Nodes beside it, at most.
 const BESIDE: usize = 24;
 /// Gains below this share of the cost are not worth a curve.
-const GAIN: f64 = 0.02;
+const GAIN: f64 = 0.01;
 /// What an estimate of a curve's cost may be too high by: a share, and metres for its coarse steps.
 const ESTIMATE: f64 = 0.95;
 const SLACK: f64 = 0.3;

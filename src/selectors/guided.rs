@@ -40,6 +40,12 @@ const GAIN: f64 = 0.1;
 /// passes something near on its way.
 const USUAL: f64 = 1.3;
 const ENOUGH: f64 = 1.1;
+/// Changes of gear that a parallel spot may take more than the curve through empty space.
+const TO_AND_FRO: f64 = 4.0;
+/// A refined plan that still costs so many times the least is searched for once more, within so
+/// many expansions.
+const DOUBTFUL: f64 = 2.0;
+const SECOND_SEARCH: usize = 1500;
 /// Expansions for something better than a plan that was known.
 const PATIENCE: usize = 400;
 /// Those it tries where there is no such curve. Each takes some microseconds, together they take a
@@ -125,10 +131,7 @@ impl GuidedPlanner {
             name: name.to_owned(),
             strategy,
             selector,
-            hars: match strategy {
-                Strategy::Paper => HybridAStar::new(config),
-                Strategy::Ranked(_) => HybridAStar::guided(config),
-            },
+            hars: HybridAStar::new(config),
             poses: Vec::new(),
             libraries: Vec::new(),
             library_search: LibrarySearch::default(),
@@ -157,7 +160,13 @@ impl GuidedPlanner {
         verdicts.clear();
         let any = f64::INFINITY;
         let mut look_up = library_search.look_up(library, verdicts, problem, &cost, any);
-        let least = look_up.least_estimate(*straights);
+        let (manoeuvre, curve) = look_up.least_estimates(*straights);
+        // Into a bay a curve may lead straight; a parallel spot takes some to and fro as a rule.
+        let to_and_fro = match problem.kind {
+            Some(ParkingType::Parallel) => TO_AND_FRO * cost.gear_change,
+            _ => 0.0,
+        };
+        let least = manoeuvre.min(curve + to_and_fro);
         let by_manoeuvre = |plan: LibraryPlan| {
             let is_straight = plan.manoeuvre >= *straights;
             let preparatory = (!is_straight).then_some(plan.preparatory);
@@ -321,7 +330,21 @@ impl GuidedPlanner {
             return (path, guidance);
         }
         let before = *left;
-        let refined = self.hars.refine(problem, goal, path.clone(), PATIENCE, left);
+        let mut refined = self.hars.refine(problem, goal, path.clone(), PATIENCE, left);
+        let model = self.hars.cost(&problem.vehicle);
+        let cost = |path: &Path| model.path(&problem.vehicle, &path.segments);
+        if refined.direction_changes() > 2 && cost(&refined) > DOUBTFUL * least {
+            let share = SECOND_SEARCH.min(*left);
+            let mut spend = share;
+            let found = self.hars.search(problem, problem.start, goal, None, &mut spend);
+            *left -= share - spend;
+            if let Ok(leg) = found {
+                let found = self.hars.refine(problem, goal, leg.path, PATIENCE, left);
+                if cost(&found) < cost(&refined) {
+                    refined = found;
+                }
+            }
+        }
         if refined != path {
             let route = if *left == before { Route::Direct } else { Route::Searched };
             guidance = Guidance { preparatory: None, route };
