@@ -104,8 +104,9 @@ fn one_model_plans_for_vehicles_it_never_saw() {
     for name in ["held-out-hatch", "held-out-estate", "held-out-suv"] {
         let file = format!("experiments/vehicles/{name}.toml");
         let vehicle = Vehicle::read(Path::new(&file)).unwrap();
-        let [searched, _] = plan_all(&models, Method::N3p, &vehicle, 4);
-        assert!(searched <= 3, "{name}: {searched} of 36 searched");
+        // Known manoeuvres serve, but for those that are looked at once more.
+        let [searched, full] = plan_all(&models, Method::N3p, &vehicle, 4);
+        assert!(searched <= 18 && full <= 3, "{name}: {searched} of 36 searched, {full} in full");
         // Without the network every plan would be a full one.
         let [searched, full] = plan_all(&models, Method::MlpN3p, &vehicle, 4);
         assert!(searched <= 22 && full <= 3, "{name}: {searched} of 36 searched, {full} in full");

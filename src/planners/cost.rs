@@ -23,8 +23,13 @@ pub struct CostModel {
     /// Per radian of |Δδ| between segments.
     pub steer_change: f64,
     /// Per metre driven nearer to an obstacle than `near`.
+    ///
+    /// This and `near` are left out of files where they are as usual: data sets are collected
+    /// without them, and keep their checksums.
+    #[serde(skip_serializing_if = "CostModel::is_usual_clearance")]
     pub clearance: f64,
     /// What is near, metres.
+    #[serde(skip_serializing_if = "CostModel::is_usual_near")]
     pub near: f64,
 }
 
@@ -57,6 +62,14 @@ impl DriveState {
 }
 
 impl CostModel {
+    fn is_usual_clearance(clearance: &f64) -> bool {
+        *clearance == Self::default().clearance
+    }
+
+    fn is_usual_near(near: &f64) -> bool {
+        *near == Self::default().near
+    }
+
     /// Checks every field: finite, not negative, and metres not free.
     pub fn validate(&self) -> Result<(), String> {
         for (field, v, min) in [

@@ -65,6 +65,9 @@ impl Library {
     /// What turns a little tighter than the vehicle can is driven at full lock: a manoeuvre begins
     /// wherever its motions lead back to from the goal.
     pub fn add(&mut self, mut segments: Vec<Segment>, model: &CostModel) {
+        // For the same reason what is too short to be worth driving is left out.
+        let least = CostModel::shortest_motion(&self.vehicle);
+        segments.retain(|s| s.length.abs() >= least);
         let limit = self.vehicle.max_curvature();
         for s in &mut segments {
             s.curvature = s.curvature.clamp(-limit, limit);

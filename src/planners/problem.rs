@@ -52,8 +52,8 @@ pub enum ProblemError {
 }
 
 impl Problem {
-    /// Clearance that plans keep from obstacles where start and goal allow it, metres; in
-    /// proportion less for vehicles shorter than the default one. Room for consumers that
+    /// Clearance that plans keep from obstacles where start and goal allow it, metres, for the
+    /// default vehicle; for others in proportion to their length. Room for consumers that
     /// interpolate sampled poses linearly.
     pub const MARGIN: f64 = 0.005;
 
@@ -131,8 +131,8 @@ impl Problem {
         bounds: Option<[Vec2; 4]>,
         margin: f64,
     ) -> Result<Problem, ProblemError> {
-        let least = Self::MARGIN * vehicle.scale().min(1.0);
-        let mut margin = if margin > Self::MARGIN { margin } else { least };
+        let least = Self::MARGIN * vehicle.scale();
+        let mut margin = if margin > Self::MARGIN { margin.max(least) } else { least };
         let mut collision = CollisionWorld::new(&obstacles, bounds, &vehicle, margin);
         let ends_are_free =
             |world: &CollisionWorld| world.pose_is_free(start) && world.pose_is_free(goal);

@@ -40,8 +40,8 @@ impl Abstraction {
 /// Obstacles that only touch a region's border do not enter it.
 const TOUCH: f64 = 1e-6;
 
-/// The farthest a bay's lane may begin beyond its usual boundary, metres.
-const MAX_SHIFT: f64 = 1.0;
+/// The farthest a bay's lane may begin beyond its usual boundary, of the bay's depth.
+const MAX_SHIFT: f64 = 1.0 / 5.5;
 
 /// The cells found around the spot, largest lane first; none where the scene has no such
 /// structure or lies below the grid.
@@ -97,13 +97,14 @@ impl Surroundings {
     pub fn abstractions(&self, kind: ParkingType, grid: &Grid) -> Vec<Abstraction> {
         // What could enter a cell, or bounds the spot.
         let floor = -grid.lane_boundary(kind);
-        let top = grid.lane_boundary(kind) + MAX_SHIFT + grid.lane_width.max;
+        let most = MAX_SHIFT * grid.bay_depth;
+        let top = grid.lane_boundary(kind) + most + grid.lane_width.max;
         let is_near = |(a, b): &(Vec2, Vec2)| a.y.max(b.y) > floor && a.y.min(b.y) < top;
         let edges: Vec<_> = self.edges.iter().copied().filter(is_near).collect();
         let mut found = Vec::new();
         let low = bottom_shift(&edges, kind, grid);
         for shift in [low, self.protrusion(kind, grid).max(low)] {
-            if shift > MAX_SHIFT || (shift > 0.0 && !kind.is_bay()) {
+            if shift > most || (shift > 0.0 && !kind.is_bay()) {
                 continue;
             }
             found = at_shift(&edges, kind, grid, shift);
@@ -131,7 +132,7 @@ impl Surroundings {
             }
         }
         for (p, _) in &self.edges[self.points_begin()..] {
-            if p.x > x_min && p.x < x_max && p.y < boundary + MAX_SHIFT {
+            if p.x > x_min && p.x < x_max && p.y < boundary + MAX_SHIFT * grid.bay_depth {
                 top = top.max(p.y);
             }
         }

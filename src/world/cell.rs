@@ -155,6 +155,21 @@ impl Grid {
         Grid { back: self.back + behind, ..*self }
     }
 
+    /// The grid for vehicles `factor` times as long.
+    pub fn scaled(&self, factor: f64) -> Grid {
+        let axis =
+            |a: Axis| Axis { min: a.min * factor, max: a.max * factor, step: a.step * factor };
+        Grid {
+            lane_width: axis(self.lane_width),
+            bay_spot_width: axis(self.bay_spot_width),
+            parallel_spot_width: axis(self.parallel_spot_width),
+            dead_end: axis(self.dead_end),
+            back: self.back * factor,
+            bay_depth: self.bay_depth * factor,
+            parallel_depth: self.parallel_depth * factor,
+        }
+    }
+
     /// The W_spot axis of a parking type.
     pub fn spot_width(&self, kind: ParkingType) -> &Axis {
         if kind.is_bay() { &self.bay_spot_width } else { &self.parallel_spot_width }

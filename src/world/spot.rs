@@ -81,12 +81,18 @@ pub fn guess(scene: &Scene, precision: Precision) -> Result<SpotGuess, ObstacleE
     };
     let usual = spot_frame(scene, kind);
     let guess = seen(usual, Some(kind))?;
-    if lane_is_open(&guess.obstacles, kind) || lane(&guess).is_some() {
+    let grid = grid(scene);
+    if lane_is_open(&guess.obstacles, kind, &grid) || lane(&guess, &grid).is_some() {
         return Ok(guess);
     }
     // The car may come from the other side, or stand across the lane.
     let other = seen(other_way(&usual, kind), Some(kind))?;
-    Ok(if lane(&other).is_some() { other } else { guess })
+    Ok(if lane(&other, &grid).is_some() { other } else { guess })
+}
+
+/// The usual spots and lanes, for the size of the vehicle.
+fn grid(scene: &Scene) -> Grid {
+    Grid::default().scaled(scene.vehicle.scale())
 }
 
 /// The goal's own frame, mirrored where the car would start to its right.
@@ -98,14 +104,14 @@ fn goal_frame(scene: &Scene) -> Frame {
 /// The likeliest spot: the car stands in its lane rather than elsewhere, and the lane is large.
 fn found(scene: &Scene, precision: Precision) -> Option<(Frame, ParkingType)> {
     let near = around_goal(scene, precision);
-    let grid = Grid::default();
+    let grid = grid(scene);
     let mut best: Option<((bool, f64), Frame, ParkingType)> = None;
     for kind in ParkingType::ALL {
         let usual = spot_frame(scene, kind);
         for frame in [usual, other_way(&usual, kind)] {
             let seen = near.map(|p| from_parked(p, kind, frame.mirrored));
             let Some(lane) = seen.abstractions(kind, &grid).first().copied() else { continue };
-            let merit = merit(&lane, frame.local_from_world(scene.start));
+            let merit = merit(&lane, &grid, frame.local_from_world(scene.start));
             if best.is_none_or(|(most, ..)| merit > most) {
                 best = Some((merit, frame, kind));
             }
@@ -119,9 +125,10 @@ fn found(scene: &Scene, precision: Precision) -> Option<(Frame, ParkingType)> {
 fn around_goal(scene: &Scene, precision: Precision) -> Surroundings {
     /// Metres from the parked centre: more than to the farthest corner of the largest cell.
     const REACH: f64 = 20.0;
+    let far = REACH * scene.vehicle.scale();
     let center = scene.vehicle.body_center(scene.goal);
     let view = Frame { origin_in_world: center, mirrored: false }.view();
-    let reach = Aabb { min: center.position(), max: center.position() }.inflated(REACH);
+    let reach = Aabb { min: center.position(), max: center.position() }.inflated(far);
     let point = |&[x, y]: &[f64; 2]| Vec2::new(x, y);
     let is_near = |points: &[[f64; 2]]| Aabb::around(points.iter().map(point)).intersects(&reach);
     let seen = |p: &[f64; 2]| precision.point(view(point(p)));
@@ -163,25 +170,24 @@ fn seen(
 }
 
 /// The largest free lane beside the spot, if there is one.
-fn lane(guess: &SpotGuess) -> Option<Abstraction> {
-    abstractions(&guess.obstacles, guess.kind?, &Grid::default()).first().copied()
+fn lane(guess: &SpotGuess, grid: &Grid) -> Option<Abstraction> {
+    abstractions(&guess.obstacles, guess.kind?, grid).first().copied()
 }
 
 /// Whether the car starts in the lane, and the lane's area.
-fn merit(lane: &Abstraction, start: Pose) -> (bool, f64) {
-    /// A car slightly out of its lane is in it.
-    const SLACK: f64 = 1.0;
-    let [area, _] = lane.regions(&Grid::default());
+fn merit(lane: &Abstraction, grid: &Grid, start: Pose) -> (bool, f64) {
+    // A car slightly out of its lane is in it.
+    let slack = grid.lane_width.min / 4.0;
+    let [area, _] = lane.regions(grid);
     let in_lane =
-        start.y > area.min.y - SLACK && start.y < area.min.y + lane.measured.lane_width + SLACK;
+        start.y > area.min.y - slack && start.y < area.min.y + lane.measured.lane_width + slack;
     let size = area.max - area.min;
     (in_lane, size.x * size.y)
 }
 
 /// Whether nothing at all enters the smallest lane beside the spot: a quick answer for scenes
 /// where the given type is right.
-fn lane_is_open(obstacles: &Obstacles, kind: ParkingType) -> bool {
-    let grid = Grid::default();
+fn lane_is_open(obstacles: &Obstacles, kind: ParkingType, grid: &Grid) -> bool {
     let boundary = grid.lane_boundary(kind);
     let top = boundary + grid.lane_width.min;
     let lane = Aabb::new(-grid.back, boundary, grid.dead_end.min, top);
