@@ -4,7 +4,7 @@ use n3p::curves::Segment;
 use n3p::curves::reeds_shepp::{Word, words};
 use n3p::evaluation::{Method, MethodSettings, Models, PathFile, oracle, suite};
 use n3p::geometry::Pose;
-use n3p::planners::{Budget, Problem, Route};
+use n3p::planners::{Budget, HybridAStarConfig, Problem, Route};
 use n3p::selectors::Features;
 use n3p::selectors::artefact::Model;
 use n3p::selectors::guided::RankedConfig;
@@ -136,7 +136,8 @@ fn settings_decide_what_is_tried_before_a_search() {
 }
 
 /// The known manoeuvres do not always do; then the curve straight to the goal is taken where it is
-/// free, as `ha-rs` takes it. Some scene of the folder is of that kind.
+/// the cheaper way. Some scene of the folder is of that kind, and in none the plan costs much more
+/// than that of `ha-rs`.
 fn check_curves_to_the_goal(folder: &str) {
     let models = Models::usual(&[Method::N3p], None).unwrap();
     let [mut n3p, mut hars] =
@@ -148,13 +149,11 @@ fn check_curves_to_the_goal(folder: &str) {
         let ours = n3p.plan(&problem, budget);
         let path = ours.outcome.unwrap_or_else(|e| panic!("{}: {e}", scene.name));
         let guidance = ours.guidance.unwrap();
-        let theirs = hars.plan(&problem, budget);
-        if guidance.route == Route::Direct && guidance.preparatory.is_none() {
-            direct += 1;
-            assert_eq!(Ok(path), theirs.outcome, "{}", scene.name);
-        } else if theirs.expansions == 0 {
-            assert_eq!(ours.expansions, 0, "{}: a search where one curve does", scene.name);
-        }
+        let theirs = hars.plan(&problem, budget).outcome.unwrap();
+        direct += usize::from(guidance.route == Route::Direct && guidance.preparatory.is_none());
+        let model = HybridAStarConfig::default().for_vehicle(&problem.vehicle).cost;
+        let [ours, theirs] = [&path, &theirs].map(|p| model.path(&problem.vehicle, &p.segments));
+        assert!(ours <= 1.5 * theirs, "{}: {ours} where {theirs} suffices", scene.name);
     }
     assert!(direct > 0);
 }
