@@ -45,7 +45,10 @@ fn bad_scenes_are_refused_with_file_field_and_remedy() {
     refused(&SCENE[..SCENE.len() / 2], &["line"]);
     refused(&SCENE.replace("[-6, 5.5, 0]", "[NaN, 5.5, 0]"), &["line"]);
     refused(&SCENE.replace("[-6, 5.5, 0]", "[1e999, 5.5, 0]"), &[]);
-    refused(&SCENE.replace("[-6, 5.5, 0]", "[-2, 0, 0]"), &["start", "touches an obstacle"]);
+    refused(
+        &SCENE.replace("[-6, 5.5, 0]", "[-2, 0, 0]"),
+        &["start", "touches an obstacle", "m into obstacles[0]"],
+    );
     refused(&SCENE.replace("[0, -1.4, 1.57", "[2, -1.4, 1.57"), &["goal", "touches an obstacle"]);
     refused(&SCENE.replace("\"reverse\"", "\"sideways\""), &["sideways", "parallel"]);
     // Each of these once ended a run late or never, or wrote onto the terminal.

@@ -13,7 +13,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use crate::curves::{Path, Segment};
-use crate::geometry::{Aabb, Pose};
+use crate::geometry::{Aabb, Pose, signed_angle};
 use crate::vehicle::Vehicle;
 use crate::world::collision::{BodyFrame, Contact, Sweep};
 
@@ -21,6 +21,14 @@ use super::Problem;
 use super::analytic::{AnalyticExpansion, Entry};
 use super::approach::{Approaches, Poses};
 use super::cost::CostModel;
+use super::joint;
+
+/// A car this near to a pose of a manoeuvre stands within it, metres: distance, and turn at full
+/// lock. Poses are looked at so far apart along it. Both for the default vehicle.
+const BESIDE: f64 = 0.4;
+const STRIDE: f64 = 0.25;
+/// The cheapest rests of manoeuvres that are bent to begin at the start.
+const RESTS: usize = 12;
 
 /// Manoeuvres prepared for one footprint and one cost model.
 #[derive(Clone, Debug)]
@@ -88,6 +96,52 @@ impl Library {
     /// Whether it was prepared for the vehicle and the footprint of `problem`.
     pub fn fits(&self, problem: &Problem) -> bool {
         self.vehicle == problem.vehicle && self.footprint == *problem.collision.footprint()
+    }
+
+    /// The plan of a car that stands within a manoeuvre, or beside one: its rest, bent to begin at
+    /// the start. The cheapest of those that are free; `None` where the car stands within none.
+    pub fn rest(&self, problem: &Problem, model: &CostModel) -> Option<(Path, f64)> {
+        let start = problem.goal.relative(problem.start);
+        let near = self.manoeuvres.iter().filter_map(|m| self.rest_of(m, start));
+        let cost = |path: &Path| model.path(&self.vehicle, &path.segments);
+        let mut near: Vec<(f64, Path)> = near.map(|path| (cost(&path), path)).collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let bent = near.into_iter().take(RESTS).filter_map(|(_, rest)| {
+            let begin = problem.goal.compose(rest.start);
+            let path = joint::close(problem, &Path { start: begin, ..rest })?;
+            let cost = cost(&path);
+            Some((path, cost))
+        });
+        bent.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// The rest of a manoeuvre from where it passes nearest to `start`, if that is near; poses are
+    /// seen from the goal.
+    fn rest_of(&self, manoeuvre: &Manoeuvre, start: Pose) -> Option<Path> {
+        let scale = self.vehicle.scale();
+        let radius = self.vehicle.turning_radius();
+        let motions = &manoeuvre.entry.rest;
+        let (mut best, mut nearest) = (None, BESIDE * scale);
+        let mut pose = manoeuvre.entry.pose;
+        for (i, s) in motions.iter().enumerate() {
+            // Nothing of this motion comes as near as the best.
+            if pose.distance(start) <= s.length.abs() + nearest {
+                let steps = (s.length.abs() / (STRIDE * scale)).ceil().max(1.0);
+                for k in 0..steps as usize {
+                    let driven = s.length * k as f64 / steps;
+                    let at = s.at(pose, driven);
+                    let turn = signed_angle(at.heading, start.heading).abs();
+                    let apart = at.distance(start) + turn * radius;
+                    if apart < nearest {
+                        (best, nearest) = (Some((i, driven, at)), apart);
+                    }
+                }
+            }
+            pose = s.end(pose);
+        }
+        let (i, driven, at) = best?;
+        let first = Segment { length: motions[i].length - driven, ..motions[i] };
+        Some(Path::new(at, std::iter::once(first).chain(motions[i + 1..].iter().copied())))
     }
 
     /// Number of manoeuvres.

@@ -33,7 +33,7 @@ pub use config::{GoalRegion, HybridAStarConfig, Resolution};
 pub use hybrid_astar::HybridAStar;
 pub use multi_heuristic::{MultiHeuristicConfig, MultiHeuristicHybridAStar};
 pub use plain::PlainHybridAStar;
-pub use problem::{Problem, ProblemError};
+pub use problem::{Conflict, Problem, ProblemError};
 pub use scenario::ScenarioHybridAStar;
 
 use crate::curves::Path;

@@ -44,11 +44,70 @@ pub enum ProblemError {
     #[error("margin is {0} m; expected a number from 0 to {max}", max = Problem::MAX_MARGIN)]
     Margin(f64),
     /// The start footprint touches an obstacle or its axle is out of bounds.
-    #[error("start: the footprint at {0:?} touches an obstacle or leaves the bounds")]
-    StartInCollision([f64; 3]),
+    #[error("start: the footprint at {0:?} {1}")]
+    StartInCollision([f64; 3], Conflict),
     /// The goal footprint touches an obstacle or its axle is out of bounds.
-    #[error("goal: the footprint at {0:?} touches an obstacle or leaves the bounds")]
-    GoalInCollision([f64; 3]),
+    #[error("goal: the footprint at {0:?} {1}")]
+    GoalInCollision([f64; 3], Conflict),
+}
+
+/// What keeps a car from standing where it is to start or to park.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Conflict {
+    /// It reaches into an obstacle.
+    #[error("touches an obstacle: it reaches {depth:.3} m into {obstacle}")]
+    Obstacle {
+        /// The scene's field, such as `obstacles[3]`.
+        obstacle: String,
+        /// The least margin by which a smaller car would clear it, metres.
+        depth: f64,
+    },
+    /// Its rear axle is out of the bounds.
+    #[error("has its axle outside the bounds")]
+    Bounds,
+    /// One of both.
+    #[error("touches an obstacle or leaves the bounds")]
+    Unknown,
+}
+
+impl Conflict {
+    /// What the car meets at `pose` of the scene, in its own frame.
+    fn of(scene: &Scene, pose: Pose) -> Conflict {
+        let vehicle = &scene.vehicle;
+        let empty = Scene { obstacles: vec![], points: vec![], ..scene.clone() };
+        let single = |obstacles: &[Vec<[f64; 2]>], points: &[[f64; 2]]| {
+            let (obstacles, points) = (obstacles.to_vec(), points.to_vec());
+            Scene { obstacles, points, ..empty.clone() }.geometry().ok()
+        };
+        let lists = scene.obstacles.chunks(1).map(|o| single(o, &[])).enumerate();
+        let lists = lists.map(|(i, o)| (format!("obstacles[{i}]"), o));
+        let points = scene.points.chunks(1).map(|p| single(&[], p)).enumerate();
+        let points = points.map(|(i, o)| (format!("points[{i}]"), o));
+        let mut deepest: Option<(String, f64)> = None;
+        for (obstacle, one) in lists.chain(points) {
+            let Some(one) = one else { continue };
+            // The margin at which it is free: negative where the car reaches in.
+            let is_free =
+                |depth: f64| CollisionWorld::new(&one, None, vehicle, -depth).pose_is_free(pose);
+            if is_free(0.0) {
+                continue;
+            }
+            let (mut touching, mut free) = (0.0, vehicle.width.min(vehicle.length) / 2.0);
+            while free - touching > 1e-4 {
+                let middle = f64::midpoint(touching, free);
+                *(if is_free(middle) { &mut free } else { &mut touching }) = middle;
+            }
+            if deepest.as_ref().is_none_or(|(_, depth)| free > *depth) {
+                deepest = Some((obstacle, free));
+            }
+        }
+        let out = |b: [f64; 4]| pose.x < b[0] || pose.y < b[1] || pose.x > b[2] || pose.y > b[3];
+        match deepest {
+            Some((obstacle, depth)) => Conflict::Obstacle { obstacle, depth },
+            None if scene.bounds.is_some_and(out) => Conflict::Bounds,
+            None => Conflict::Unknown,
+        }
+    }
 }
 
 impl Problem {
@@ -99,12 +158,14 @@ impl Problem {
         };
         Self::checked(scene.vehicle, frame, kind, [start, goal], obstacles, bounds, margin).map_err(
             |e| match e {
-                ProblemError::StartInCollision(_) => {
-                    ProblemError::StartInCollision(scene.start.into())
-                }
-                ProblemError::GoalInCollision(_) => {
-                    ProblemError::GoalInCollision(scene.goal.into())
-                }
+                ProblemError::StartInCollision(..) => ProblemError::StartInCollision(
+                    scene.start.into(),
+                    Conflict::of(scene, scene.start),
+                ),
+                ProblemError::GoalInCollision(..) => ProblemError::GoalInCollision(
+                    scene.goal.into(),
+                    Conflict::of(scene, scene.goal),
+                ),
                 other => other,
             },
         )
@@ -151,10 +212,10 @@ impl Problem {
             collision = far.tolerating(&close, &vehicle, margin);
         }
         if !collision.pose_is_free(start) {
-            return Err(ProblemError::StartInCollision(start.into()));
+            return Err(ProblemError::StartInCollision(start.into(), Conflict::Unknown));
         }
         if !collision.pose_is_free(goal) {
-            return Err(ProblemError::GoalInCollision(goal.into()));
+            return Err(ProblemError::GoalInCollision(goal.into(), Conflict::Unknown));
         }
         Ok(Problem { vehicle, frame, kind, start, goal, obstacles, collision, margin })
     }

@@ -40,6 +40,8 @@ const GAIN: f64 = 0.1;
 /// passes something near on its way.
 const USUAL: f64 = 1.3;
 const ENOUGH: f64 = 1.1;
+/// Who starts within so many vehicle lengths of the goal may stand within a manoeuvre.
+const NEAR_GOAL: f64 = 2.0;
 /// Changes of gear that a parallel spot may take more than the curve through empty space.
 const TO_AND_FRO: f64 = 4.0;
 /// A refined plan that still costs so many times the least is searched for once more, within so
@@ -313,6 +315,22 @@ impl GuidedPlanner {
         Ok((self.hars.refine(problem, &plain, leg.path, patience, left), guidance))
     }
 
+    /// What is known, or the rest of the manoeuvre that the car stands in where that costs less: who
+    /// replans on the way goes on.
+    fn or_rest(&mut self, problem: &Problem, known: Known) -> Known {
+        let is_near = problem.start.distance(problem.goal) < NEAR_GOAL * problem.vehicle.length;
+        let library = self.libraries.first().map(|p| &p.library).filter(|l| l.fits(problem));
+        let Some(library) = library.filter(|_| is_near) else { return known };
+        let model = self.hars.cost(&problem.vehicle);
+        match library.rest(problem, &model) {
+            Some((path, cost)) if cost < known.cost => {
+                let guidance = Guidance { preparatory: None, route: Route::Library };
+                Known { path, cost, guidance, least: known.least }
+            }
+            _ => known,
+        }
+    }
+
     /// The plan by what is known: as it is where it costs little more than it must, else refined.
     fn settle(
         &mut self,
@@ -321,6 +339,7 @@ impl GuidedPlanner {
         known: Known,
         left: &mut usize,
     ) -> (Path, Guidance) {
+        let known = self.or_rest(problem, known);
         let Known { path, cost, mut guidance, least } = known;
         // What is known of the spot says what it takes; where that is little, the curve through
         // empty space does.
