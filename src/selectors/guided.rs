@@ -315,6 +315,13 @@ impl GuidedPlanner {
         Ok((self.hars.refine(problem, &plain, leg.path, patience, left), guidance))
     }
 
+    /// Whether a plan costs no more than usual: what is known of the spot says what it takes; where
+    /// that is little, the curve through empty space does.
+    fn is_usual(&mut self, problem: &Problem, goal: &GoalSet, known: &Known) -> bool {
+        known.cost <= USUAL * known.least
+            || known.cost <= ENOUGH * self.hars.lower_bound(problem, goal)
+    }
+
     /// What is known, or the rest of the manoeuvre that the car stands in where that costs less: who
     /// replans on the way goes on.
     fn or_rest(&mut self, problem: &Problem, known: Known) -> Known {
@@ -336,18 +343,18 @@ impl GuidedPlanner {
         &mut self,
         problem: &Problem,
         goal: &GoalSet,
-        known: Known,
+        mut known: Known,
         left: &mut usize,
     ) -> (Path, Guidance) {
-        let known = self.or_rest(problem, known);
-        let Known { path, cost, mut guidance, least } = known;
-        // What is known of the spot says what it takes; where that is little, the curve through
-        // empty space does.
-        if (cost <= USUAL * least || cost <= ENOUGH * self.hars.lower_bound(problem, goal))
-            && !self.hars.passes_near(problem, &path)
-        {
-            return (path, guidance);
+        let mut is_usual = self.is_usual(problem, goal, &known);
+        if !is_usual {
+            known = self.or_rest(problem, known);
+            is_usual = self.is_usual(problem, goal, &known);
         }
+        if is_usual && !self.hars.passes_near(problem, &known.path) {
+            return (known.path, known.guidance);
+        }
+        let Known { path, mut guidance, least, .. } = known;
         let before = *left;
         let mut refined = self.hars.refine(problem, goal, path.clone(), PATIENCE, left);
         let model = self.hars.cost(&problem.vehicle);
