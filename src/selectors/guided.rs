@@ -42,6 +42,8 @@ const USUAL: f64 = 1.3;
 const ENOUGH: f64 = 1.1;
 /// Who starts within so many vehicle lengths of the goal may stand within a manoeuvre.
 const NEAR_GOAL: f64 = 2.0;
+/// Who starts within so many does so as a rule.
+const AT_THE_SPOT: f64 = 1.0;
 /// Changes of gear that a parallel spot may take more than the curve through empty space.
 const TO_AND_FRO: f64 = 4.0;
 /// A refined plan that still costs so many times the least is searched for once more, within so
@@ -325,9 +327,8 @@ impl GuidedPlanner {
     /// What is known, or the rest of the manoeuvre that the car stands in where that costs less: who
     /// replans on the way goes on.
     fn or_rest(&mut self, problem: &Problem, known: Known) -> Known {
-        let is_near = problem.start.distance(problem.goal) < NEAR_GOAL * problem.vehicle.length;
         let library = self.libraries.first().map(|p| &p.library).filter(|l| l.fits(problem));
-        let Some(library) = library.filter(|_| is_near) else { return known };
+        let Some(library) = library else { return known };
         let model = self.hars.cost(&problem.vehicle);
         match library.rest(problem, &model) {
             Some((path, cost)) if cost < known.cost => {
@@ -347,7 +348,8 @@ impl GuidedPlanner {
         left: &mut usize,
     ) -> (Path, Guidance) {
         let mut is_usual = self.is_usual(problem, goal, &known);
-        if !is_usual {
+        let apart = problem.start.distance(problem.goal) / problem.vehicle.length;
+        if apart < AT_THE_SPOT || (!is_usual && apart < NEAR_GOAL) {
             known = self.or_rest(problem, known);
             is_usual = self.is_usual(problem, goal, &known);
         }
