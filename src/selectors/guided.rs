@@ -347,11 +347,11 @@ impl GuidedPlanner {
         mut known: Known,
         left: &mut usize,
     ) -> (Path, Guidance) {
-        let mut is_usual = self.is_usual(problem, goal, &known);
+        let is_usual = self.is_usual(problem, goal, &known);
         let apart = problem.start.distance(problem.goal) / problem.vehicle.length;
-        if apart < AT_THE_SPOT || (!is_usual && apart < NEAR_GOAL) {
+        let may_go_on = apart < AT_THE_SPOT || (!is_usual && apart < NEAR_GOAL);
+        if may_go_on && known.cost > ENOUGH * self.hars.lower_bound(problem, goal) {
             known = self.or_rest(problem, known);
-            is_usual = self.is_usual(problem, goal, &known);
         }
         if is_usual && !self.hars.passes_near(problem, &known.path) {
             return (known.path, known.guidance);
