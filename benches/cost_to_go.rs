@@ -36,7 +36,7 @@ fn bench(c: &mut Criterion) {
         group.bench_function(kind.name(), |b| {
             b.iter(|| {
                 let problem = next.next().expect("endless");
-                let result = planner.plan(problem, Budget { max_expansions: 1 });
+                let result = planner.plan(problem, Budget::new(1));
                 assert_eq!(result.outcome, Err(NoPath::Enclosed));
             });
         });

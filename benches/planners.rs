@@ -14,7 +14,7 @@ use n3p::world::generate::{GeneratorConfig, generate};
 use n3p::world::{Level, ParkingType};
 
 const SCENES: u64 = 10;
-const BUDGET: Budget = Budget { max_expansions: 200_000 };
+const BUDGET: Budget = Budget::new(200_000);
 
 fn bench(c: &mut Criterion) {
     let (config, vehicle) = (GeneratorConfig::default(), Vehicle::default());

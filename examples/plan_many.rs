@@ -12,7 +12,7 @@ use n3p::vehicle::Vehicle;
 use n3p::world::{Level, ParkingType};
 
 const SEED: u64 = 1;
-const BUDGET: Budget = Budget { max_expansions: 200_000 };
+const BUDGET: Budget = Budget::new(200_000);
 
 fn main() -> anyhow::Result<()> {
     let args: Vec<String> = std::env::args().skip(1).collect();

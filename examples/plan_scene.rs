@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut planner =
         GuidedPlanner::ranked("n3p", model.into_selector(), config, RankedConfig::default());
 
-    let result = planner.plan(&problem, Budget { max_expansions: 200_000 });
+    let result = planner.plan(&problem, Budget::new(200_000));
     let path = result.outcome?.to_world(&problem.frame);
     println!(
         "{}: {:.2} m, {} direction changes, {} expansions",

@@ -92,7 +92,7 @@ fn a_path_of_the_cell_is_free_in_the_scene() {
             else {
                 continue;
             };
-            let budget = Budget { max_expansions: 5_000 };
+            let budget = Budget::new(5_000);
             let Ok(mut path) = planner.plan(&in_cell, budget).outcome else { continue };
             path.start.y += a.shift;
             let world = CollisionWorld::new(&problem.obstacles, None, &vehicle, 0.0);

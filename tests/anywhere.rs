@@ -15,7 +15,7 @@ use n3p::world::generate::{GeneratorConfig, generate};
 use n3p::world::{Level, ParkingType, Scene};
 use rand::RngExt;
 
-const BUDGET: Budget = Budget { max_expansions: 200_000 };
+const BUDGET: Budget = Budget::new(200_000);
 
 /// The scene as it lies in `frame`, seen from the world.
 fn moved(scene: &Scene, frame: &Frame) -> Scene {

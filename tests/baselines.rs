@@ -2,14 +2,16 @@
 //! description says.
 
 use n3p::evaluation::{Method, MethodSettings, Models, PathFile, oracle};
-use n3p::planners::{Budget, HybridAStar, HybridAStarConfig, NoPath, PlanResult, Planner, Problem};
+use n3p::planners::{
+    Budget, Effort, HybridAStar, HybridAStarConfig, NoPath, PlanResult, Planner, Problem,
+};
 use n3p::vehicle::Vehicle;
 use n3p::world::generate::{GeneratorConfig, generate};
 use n3p::world::{Level, ParkingType, Scene};
 
 const SEED: u64 = 78;
 const SCENES: u64 = 12;
-const BUDGET: Budget = Budget { max_expansions: 200_000 };
+const BUDGET: Budget = Budget::new(200_000);
 
 fn scenes() -> Vec<(ParkingType, Scene)> {
     let (config, vehicle) = (GeneratorConfig::default(), Vehicle::default());
@@ -83,8 +85,9 @@ fn the_exit_manoeuvre_saves_most_of_the_search() {
 fn holding_on_never_costs_more() {
     let (config, vehicle) = (HybridAStarConfig::default(), Vehicle::default());
     let plan_all = |solutions| -> Vec<PlanResult> {
-        let mut planner = HybridAStar::hold(config, solutions).unrefined();
-        let plan = |(_, scene): &(_, Scene)| planner.plan(&Problem::new(scene).unwrap(), BUDGET);
+        let mut planner = HybridAStar::hold(config, solutions);
+        let first = Budget { effort: Effort::First, ..BUDGET };
+        let plan = |(_, scene): &(_, Scene)| planner.plan(&Problem::new(scene).unwrap(), first);
         scenes().iter().map(plan).collect()
     };
     let (first, best) = (plan_all(1), plan_all(5));
@@ -102,6 +105,32 @@ fn a_spent_budget_is_the_reason() {
     let (_, scene) = scenes().pop().unwrap();
     let problem = Problem::new(&scene).unwrap();
     let mut planner = Method::Ha.build(&Models::default(), &MethodSettings::default()).unwrap();
-    let result = planner.plan(&problem, Budget { max_expansions: 10 });
+    let result = planner.plan(&problem, Budget::new(10));
     assert_eq!((result.outcome, result.expansions), (Err(NoPath::BudgetSpent), 10));
+}
+
+/// More effort never ends with a dearer path, the first path takes no more than it did to find, and
+/// an unknown effort is refused by name.
+#[test]
+fn effort_only_ever_pays() {
+    let config = HybridAStarConfig::default();
+    let models = Models::load(&["models/knn.bin".to_owned()]).unwrap();
+    for method in [Method::HaRs, Method::Mhha, Method::N3p] {
+        let mut planner = method.build(&models, &MethodSettings::default()).unwrap();
+        for (kind, scene) in scenes().iter().step_by(3) {
+            let problem = Problem::new(scene).unwrap();
+            let [first, usual, most] =
+                Effort::ALL.map(|effort| planner.plan(&problem, Budget { effort, ..BUDGET }));
+            let what = format!("{method} {kind} {}", scene.name);
+            let cost = |r: &PlanResult| {
+                config.cost.of_plan(&problem, r.outcome.as_ref().expect("each is solved"))
+            };
+            assert!(first.expansions <= usual.expansions, "{what}");
+            assert!(cost(&usual) <= cost(&first) + 1e-3, "{what}");
+            assert!(cost(&most) <= cost(&usual) + 1e-3, "{what}");
+            assert!(most.expansions <= BUDGET.max_expansions, "{what}");
+        }
+    }
+    assert_eq!("most".parse(), Ok(Effort::Most));
+    assert!("utmost".parse::<Effort>().unwrap_err().contains("first, usual, most"));
 }

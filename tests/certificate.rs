@@ -14,7 +14,7 @@ use n3p::world::{Obstacles, Scene};
 use proptest::prelude::*;
 use rand::{Rng, RngExt};
 
-const BUDGET: Budget = Budget { max_expansions: 200_000 };
+const BUDGET: Budget = Budget::new(200_000);
 
 /// A car that drives 20 m straight ahead.
 fn ahead(obstacles: Vec<Vec<[f64; 2]>>, points: Vec<[f64; 2]>) -> Scene {
@@ -110,7 +110,7 @@ fn a_scene_of_ten_kilometres_takes_the_memory_of_what_is_searched() {
     let wall = vec![[6.0, -4.0], [6.0, 4.0]];
     let goal = Pose::new(7000.0, 7000.0, 0.0);
     let problem = Problem::new(&Scene { goal, ..ahead(vec![wall], vec![]) }).unwrap();
-    let few = Budget { max_expansions: 2_000 };
+    let few = Budget::new(2_000);
     let result = HybridAStar::new(HybridAStarConfig::default()).plan(&problem, few);
     assert!(result.expansions <= 2_000);
 }

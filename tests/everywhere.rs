@@ -8,7 +8,7 @@ use n3p::vehicle::Vehicle;
 use n3p::world::generate::{GeneratorConfig, generate};
 use n3p::world::{Level, ParkingType, Scene};
 
-const BUDGET: Budget = Budget { max_expansions: 200_000 };
+const BUDGET: Budget = Budget::new(200_000);
 const SEED: u64 = 31;
 
 fn scenes(count: u64) -> Vec<Scene> {

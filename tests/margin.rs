@@ -15,7 +15,7 @@ use predicates::prelude::*;
 use predicates::str::contains;
 use proptest::prelude::{ProptestConfig, prop_assert, prop_assert_eq, proptest};
 
-const BUDGET: Budget = Budget { max_expansions: 50_000 };
+const BUDGET: Budget = Budget::new(50_000);
 
 /// What the oracle, which looks every centimetre, may find below the margin, metres: rounding.
 const TOL: f64 = 1e-3;
@@ -60,7 +60,7 @@ fn plans_keep_the_margin_in_the_eyes_of_the_oracle() {
         for i in 0..30 {
             let kind = ParkingType::ALL[i as usize % 3];
             let case = Case { scene: scene(kind, Level::Easy, i), kind: Some(kind), level: None };
-            let usual = EpisodeConfig::new(BUDGET.max_expansions);
+            let usual = EpisodeConfig::new(BUDGET);
             let config = EpisodeConfig { margin_m: ASKED, repeats: 0, ..usual };
             let episode = episode::run(&case, planner.as_mut(), &config).unwrap();
             let margin = episode.problem.margin;
@@ -131,7 +131,7 @@ fn no_margin_is_the_usual_one() {
         let config = SuiteConfig {
             methods: vec![Method::HaRs, Method::N3p],
             settings: MethodSettings::default(),
-            max_expansions: BUDGET.max_expansions,
+            budget: BUDGET,
             margin_m,
             threads: 1,
         };

@@ -93,7 +93,7 @@ fn no_method_fails_on_900_scenes() {
         let problem = Problem::new(&case.scene).unwrap();
         for planner in &mut planners {
             let name = format!("{} by {}", case.scene.name, planner.name());
-            let result = planner.plan(&problem, Budget { max_expansions: 200_000 });
+            let result = planner.plan(&problem, Budget::new(200_000));
             let path = result.outcome.unwrap_or_else(|reason| panic!("{name}: {reason}"));
             let file = PathFile::new(&case.scene, &problem.frame, &path, planner.name());
             if let Err(violation) = oracle::check(&case.scene, &file) {
@@ -116,7 +116,7 @@ fn settings_decide_what_is_tried_before_a_search() {
         let (mut library, mut searched) = (0, 0);
         for case in &scenes {
             let problem = Problem::new(&case.scene).unwrap();
-            let result = planner.plan(&problem, Budget { max_expansions: 200_000 });
+            let result = planner.plan(&problem, Budget::new(200_000));
             assert!(result.outcome.is_ok(), "{}", case.scene.name);
             library += usize::from(result.guidance.unwrap().route == Route::Library);
             searched += usize::from(result.expansions > 0);
@@ -145,7 +145,7 @@ fn check_curves_to_the_goal(folder: &str) {
     let mut direct = 0;
     for scene in Scene::read_dir(folder.as_ref()).unwrap() {
         let problem = Problem::new(&scene).unwrap();
-        let budget = Budget { max_expansions: 200_000 };
+        let budget = Budget::new(200_000);
         let ours = n3p.plan(&problem, budget);
         let path = ours.outcome.unwrap_or_else(|e| panic!("{}: {e}", scene.name));
         let guidance = ours.guidance.unwrap();

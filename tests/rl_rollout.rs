@@ -13,7 +13,7 @@ use n3p::world::{Level, ParkingType, Scene};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-const BUDGET: Budget = Budget { max_expansions: 100_000 };
+const BUDGET: Budget = Budget::new(100_000);
 
 /// A policy made of a function.
 struct Function<F>(F);
@@ -51,7 +51,7 @@ fn even_a_random_walk_parks_and_passes_the_independent_check() {
     for kind in ParkingType::ALL {
         for index in 0..20 {
             let case = Case { scene: scene(kind, index), kind: Some(kind), level: None };
-            let config = EpisodeConfig::new(BUDGET.max_expansions);
+            let config = EpisodeConfig::new(BUDGET);
             let row = episode::run(&case, &mut planner, &config).unwrap().row;
             assert_eq!(row.method, "policy");
             assert!(row.nodes <= 400);
@@ -117,7 +117,7 @@ fn steps_are_limited_by_horizon_and_budget_and_standing_still_is_no_path() {
     let problem = Problem::new(&scene(ParkingType::Parallel, 1)).unwrap();
     let result = planner.plan(&problem, BUDGET);
     assert_eq!((result.outcome, result.expansions), (Err(NoPath::OutOfSteps), 400));
-    let result = planner.plan(&problem, Budget { max_expansions: 7 });
+    let result = planner.plan(&problem, Budget::new(7));
     assert_eq!((result.outcome, result.expansions), (Err(NoPath::BudgetSpent), 7));
 }
 

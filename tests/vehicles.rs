@@ -11,7 +11,7 @@ use n3p::world::generate::{GeneratorConfig, generate};
 use n3p::world::{Level, ParkingType};
 use proptest::prelude::*;
 
-const BUDGET: Budget = Budget { max_expansions: 200_000 };
+const BUDGET: Budget = Budget::new(200_000);
 
 /// Plans generated scenes for `vehicle` with `method`; every path must pass the independent check.
 /// Returns how many plans needed a search, and how many a full one.

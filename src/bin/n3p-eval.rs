@@ -10,6 +10,7 @@ use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::evaluation::report::{self, Provenance};
 use n3p::evaluation::suite::{self, SuiteConfig, SuiteError};
 use n3p::evaluation::{Case, Method, MethodSettings, Models, Outputs, metrics, quality};
+use n3p::planners::{Budget, Effort};
 use n3p::progress;
 use n3p::rl::source::PolicySource;
 use n3p::training;
@@ -70,6 +71,10 @@ struct Args {
     /// Expansion budget per scene and method.
     #[arg(long, default_value_t = 200_000, value_name = "N")]
     max_expansions: usize,
+    /// What becomes of a first path: "first" takes it as it is, "usual" looks for better where it
+    /// costs more than usual, "most" always does, with half of the budget.
+    #[arg(long, default_value_t, value_name = "first|usual|most")]
+    effort: Effort,
     /// Worker threads; more than one disturbs the times, never the results.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
@@ -100,7 +105,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
             given => given.to_vec(),
         },
         settings: MethodSettings::default(),
-        max_expansions: args.max_expansions,
+        budget: Budget { max_expansions: args.max_expansions, effort: args.effort },
         margin_m: args.margin,
         threads: args.threads.into(),
     };
@@ -140,7 +145,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
         );
     }
 
-    let provenance = Provenance::here(title, args.seed, args.max_expansions, args.threads.into());
+    let provenance = Provenance::here(title, args.seed, config.budget, args.threads.into());
     outputs.finish("Evaluation", &cases, &mut rows, &[], &provenance)?;
     if args.json {
         let groups = metrics::summarise(&rows, args.seed);

@@ -15,7 +15,7 @@ use n3p::evaluation::{
     episode, trace,
 };
 use n3p::files::{check_writable, reason, write_whole};
-use n3p::planners::Problem;
+use n3p::planners::{Budget, Effort, Problem};
 use n3p::rl::source::PolicySource;
 use n3p::training;
 use n3p::world::Scene;
@@ -62,6 +62,10 @@ struct Args {
     /// Expansion budget.
     #[arg(long, default_value_t = 200_000, value_name = "N")]
     max_expansions: usize,
+    /// What becomes of a first path: "first" takes it as it is, "usual" looks for better where it
+    /// costs more than usual, "most" always does, with half of the budget.
+    #[arg(long, default_value_t, value_name = "first|usual|most")]
+    effort: Effort,
     #[command(flatten)]
     limits: Limits,
 }
@@ -137,7 +141,8 @@ fn plan(args: &Args) -> Result<ExitCode> {
     let mut planner = method.build(&models, &MethodSettings::default()).or_bad_input()?;
     let case = Case { kind: problem.kind, level: None, scene };
     // One run, as it comes: the time includes what a first call costs.
-    let usual = EpisodeConfig::new(args.max_expansions);
+    let budget = Budget { max_expansions: args.max_expansions, effort: args.effort };
+    let usual = EpisodeConfig::new(budget);
     let once = EpisodeConfig { repeats: 0, margin_m: args.margin, ..usual };
     let episode = episode::run(&case, planner.as_mut(), &once)?;
 

@@ -6,7 +6,9 @@ use rand_chacha::ChaCha8Rng;
 use super::config::CollectConfig;
 use super::schema::{Sample, Status, to_step};
 use crate::geometry::{Aabb, Pose, wrap_angle};
-use crate::planners::{AnalyticTail, Budget, HybridAStar, NoPath, PlanResult, Planner, Problem};
+use crate::planners::{
+    AnalyticTail, Budget, Effort, HybridAStar, NoPath, PlanResult, Planner, Problem,
+};
 use crate::rng::{Stream, rng};
 use crate::world::ParkingType;
 use crate::world::cell::{Cell, Grid};
@@ -54,7 +56,7 @@ impl<'a> Sampler<'a> {
     pub fn new(config: &'a CollectConfig) -> Self {
         Self {
             config,
-            planner: HybridAStar::hold(config.planner, config.solutions as usize).unrefined(),
+            planner: HybridAStar::hold(config.planner, config.solutions as usize),
             current: None,
         }
     }
@@ -104,7 +106,7 @@ impl<'a> Sampler<'a> {
         };
 
         problem.start = start;
-        let budget = Budget { max_expansions: config.max_expansions };
+        let budget = Budget { max_expansions: config.max_expansions, effort: Effort::First };
         let result = self.planner.plan(problem, budget);
         let tail = result.outcome.as_ref().ok().and_then(|path| {
             let snap = |p: Pose| to_step(Pose { heading: wrap_angle(p.heading), ..p });

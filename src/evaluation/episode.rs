@@ -22,7 +22,7 @@ pub struct Case {
 /// How episodes are run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EpisodeConfig {
-    /// Expansion budget.
+    /// How much work a plan may take.
     pub budget: Budget,
     /// Clearance that plans keep where start and goal allow it, metres, 0 to 1: see
     /// [`Problem::with_margin`].
@@ -34,9 +34,8 @@ pub struct EpisodeConfig {
 }
 
 impl EpisodeConfig {
-    /// The usual timing and margin with `max_expansions`.
-    pub fn new(max_expansions: usize) -> Self {
-        let budget = Budget { max_expansions };
+    /// The usual timing and margin with `budget`.
+    pub fn new(budget: Budget) -> Self {
         Self { budget, margin_m: Problem::MARGIN, repeats: 5, repeat_within_s: 0.05 }
     }
 }

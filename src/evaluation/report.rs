@@ -11,6 +11,7 @@ use super::quality;
 use super::rows::Row;
 use super::table;
 use crate::dataset::schema::GIT_REVISION;
+use crate::planners::{Budget, Effort};
 
 /// Where and how a run was made.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -35,11 +36,13 @@ pub struct Provenance {
     pub seed: u64,
     /// Expansion budget per episode.
     pub max_expansions: usize,
+    /// What became of first paths.
+    pub effort: Effort,
 }
 
 impl Provenance {
     /// This machine, this build, now.
-    pub fn here(scenes: String, seed: u64, max_expansions: usize, threads: usize) -> Self {
+    pub fn here(scenes: String, seed: u64, budget: Budget, threads: usize) -> Self {
         let arguments: Vec<String> = std::env::args().collect();
         let program = arguments.first().map_or("", |p| p.rsplit(['/', '\\']).next().unwrap_or(p));
         let rest = arguments.iter().skip(1).map(String::as_str);
@@ -53,7 +56,8 @@ impl Provenance {
             git_revision: GIT_REVISION.to_owned(),
             scenes,
             seed,
-            max_expansions,
+            max_expansions: budget.max_expansions,
+            effort: budget.effort,
         }
     }
 }
@@ -68,7 +72,10 @@ impl Provenance {
             ("Version", format!("n3p {}, revision {}", self.crate_version, self.git_revision)),
             ("Scenes", self.scenes.clone()),
             ("Seed of the intervals", self.seed.to_string()),
-            ("Budget", format!("{} expansions per episode", self.max_expansions)),
+            (
+                "Budget",
+                format!("{} expansions per episode, effort {}", self.max_expansions, self.effort),
+            ),
         ]
     }
 }

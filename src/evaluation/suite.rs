@@ -9,7 +9,7 @@ use super::episode::{self, Case, Episode, EpisodeConfig};
 use super::method::{Method, MethodError, MethodSettings};
 use super::models::{Models, ModelsError};
 use super::rows::Row;
-use crate::planners::{Planner, Problem, ProblemError};
+use crate::planners::{Budget, Planner, Problem, ProblemError};
 use crate::vehicle::Vehicle;
 use crate::world::generate::{GeneratorConfig, GeneratorError, generate};
 use crate::world::scene::SceneError;
@@ -22,8 +22,8 @@ pub struct SuiteConfig {
     pub methods: Vec<Method>,
     /// Settings of the planners.
     pub settings: MethodSettings,
-    /// Expansion budget per episode.
-    pub max_expansions: usize,
+    /// Budget of an episode.
+    pub budget: Budget,
     /// Clearance that plans keep where start and goal allow it, metres, 0 to 1: see
     /// [`Problem::with_margin`].
     pub margin_m: f64,
@@ -215,7 +215,7 @@ where
         for mut planners in planners {
             let (send, next) = (send.clone(), &next);
             scope.spawn(move || {
-                let usual = EpisodeConfig::new(config.max_expansions);
+                let usual = EpisodeConfig::new(config.budget);
                 let episodes = EpisodeConfig { margin_m: config.margin_m, ..usual };
                 loop {
                     let job = next.fetch_add(1, Ordering::Relaxed);

@@ -8,7 +8,7 @@ use crate::dataset::{CollectConfig, Subset};
 use crate::evaluation::suite::MAX_COUNT;
 use crate::evaluation::{Method, MethodSettings, SuiteConfig};
 use crate::files::{TomlError, read_toml};
-use crate::planners::{HybridAStarConfig, Problem};
+use crate::planners::{Budget, Effort, HybridAStarConfig, Problem};
 use crate::rl::courses::Course;
 use crate::rl::rollout::RolloutConfig;
 use crate::selectors::guided::RankedConfig;
@@ -122,6 +122,9 @@ pub struct EvaluateConfig {
     /// Expansion budget per episode.
     #[serde(default = "max_expansions")]
     pub max_expansions: usize,
+    /// What becomes of first paths.
+    #[serde(default)]
+    pub effort: Effort,
     /// Settings of every search.
     #[serde(default)]
     pub planner: HybridAStarConfig,
@@ -134,12 +137,17 @@ pub struct EvaluateConfig {
 }
 
 impl EvaluateConfig {
+    /// The budget of an episode.
+    pub(super) fn budget(&self) -> Budget {
+        Budget { max_expansions: self.max_expansions, effort: self.effort }
+    }
+
     /// These settings for `methods`, one thread.
     pub(super) fn suite(&self, methods: &[Method]) -> SuiteConfig {
         SuiteConfig {
             methods: methods.to_vec(),
             settings: MethodSettings { planner: self.planner, n3p: self.n3p, rl: self.rl },
-            max_expansions: self.max_expansions,
+            budget: self.budget(),
             margin_m: Problem::MARGIN,
             threads: 1,
         }

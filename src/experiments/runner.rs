@@ -356,7 +356,7 @@ impl Runner<'_> {
             let file = folder.join("points.json");
             let (c, e) = (self.config, &self.config.evaluate);
             let scenes = (&curve.methods, curve.count, curve.seed, &c.vehicle);
-            let planning = (&e.types, &e.levels, e.max_expansions, &e.planner, &e.n3p);
+            let planning = (&e.types, &e.levels, e.max_expansions, e.effort, &e.planner, &e.n3p);
             let settings = settings((&stage, data, part, scenes, planning, &c.train.mlp));
             let known = read_points(&file);
             let todo = self.stages.begin(&stage, &settings, known.is_some())?;
@@ -484,7 +484,7 @@ impl Runner<'_> {
                 (None, None) => format!("data set and training seed {}", self.config.seed),
             }
         );
-        let provenance = Provenance::here(scenes, e.seed, e.max_expansions, 1);
+        let provenance = Provenance::here(scenes, e.seed, e.budget(), 1);
         let title = format!("Experiment {}", self.config.name);
         outputs.finish(&title, &cases, &mut rows, curve, &provenance)?;
         self.stages.finish("evaluate", &settings)?;

@@ -5,8 +5,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::curves::Segment;
+use crate::curves::{Path, Segment};
 use crate::vehicle::{Gear, Vehicle};
+
+use super::Problem;
+use super::nearness::Nearness;
 
 /// Weights of the cost terms, those of changes for the default vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -140,5 +143,12 @@ impl CostModel {
             state = next;
         }
         total
+    }
+
+    /// Cost of a whole path of `problem`, nearness to its obstacles included: what planners compare.
+    pub fn of_plan(&self, problem: &Problem, path: &Path) -> f64 {
+        let model = self.scaled(problem.vehicle.scale());
+        let nearness = Nearness::new(problem, &model).of_path(path);
+        model.path(&problem.vehicle, &path.segments) + nearness
     }
 }

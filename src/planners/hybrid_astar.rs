@@ -23,7 +23,7 @@ use super::multi_heuristic::Guides;
 use super::nearness::Nearness;
 use super::search::{NodeIndex, Search};
 use super::shortcut::Shortcuts;
-use super::{Budget, NoPath, PlanResult, Planner, Problem};
+use super::{Budget, Effort, NoPath, PlanResult, Planner, Problem};
 
 /// Hybrid A* with Reeds-Shepp expansion: the methods `ha-rs` and `ha-hold`.
 #[derive(Debug)]
@@ -37,15 +37,7 @@ pub struct HybridAStar {
     /// Looks for something cheaper than a plan: several queues find other ways soonest.
     improver: Search,
     words: Vec<Word>,
-    /// Whether plans are refined.
-    refines: bool,
 }
-
-/// A plan that costs at most so many times what it must cost at least is good enough.
-const ENOUGH: f64 = 1.1;
-/// Expansions that may be spent on something better than a known plan, at least; twice as many
-/// as the plan took where that is more.
-const PATIENCE: usize = 400;
 
 /// What one search found.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,13 +67,7 @@ impl HybridAStar {
             shortcuts: Shortcuts::default(),
             improver: Search::guided(Guides::new(config.multi_heuristic)),
             words: Vec::new(),
-            refines: true,
         }
-    }
-
-    /// The same search whose solutions are left as they are found: what data are collected with.
-    pub fn unrefined(self) -> Self {
-        Self { refines: false, ..self }
     }
 
     /// The first solution found by a search with several queues (see `multi_heuristic.rs`).
@@ -249,6 +235,7 @@ impl HybridAStar {
         problem: &Problem,
         goal: &GoalSet,
         best: &mut Option<Leg>,
+        enough: f64,
         expansions: &mut usize,
     ) {
         let Self { improver, analytic, .. } = self;
@@ -261,7 +248,7 @@ impl HybridAStar {
             }
             *expansions -= 1;
             // Nothing much cheaper leads through this node.
-            if improver.estimate(node) * ENOUGH >= bound {
+            if improver.estimate(node) * enough >= bound {
                 continue;
             }
             if improver.wants_curve(node)
@@ -283,30 +270,37 @@ impl HybridAStar {
         lower_bound(problem.start, goal, &problem.vehicle, &model, &mut self.words)
     }
 
-    /// `path` or a better one: its corners are cut, and where it still costs much more than it must,
-    /// a search looks for something cheaper, within `patience` of the expansions `left`.
+    /// `path`, found with `spent` expansions, or a better one: its corners are cut, and where it still
+    /// costs much more than it must, a search looks for something cheaper, as long as the `effort`
+    /// says.
     pub(crate) fn refine(
         &mut self,
         problem: &Problem,
         goal: &GoalSet,
         path: Path,
-        patience: usize,
+        effort: Effort,
+        spent: usize,
         left: &mut usize,
     ) -> Path {
+        let path = match effort {
+            Effort::First => return path,
+            Effort::Usual => path,
+            Effort::Most => self.refine(problem, goal, path, Effort::Usual, spent, left),
+        };
         let model = self.cost(&problem.vehicle);
         let estimates = self.queue.curve_estimates(&problem.vehicle, &model);
         let (path, cost) = self.shortcuts.cut(problem, &model, estimates, path);
-        if cost <= ENOUGH * self.lower_bound(problem, goal) {
+        if cost <= effort.enough() * self.lower_bound(problem, goal) {
             return path;
         }
         let Ok(config) = self.config.for_search(&problem.vehicle) else { return path };
         let domain = config.domains(problem, problem.start, goal.pose)[0];
         let resolution = &config.resolutions[0];
         let attempt = Attempt { config: &config, resolution, domain, careful: false };
-        let share = patience.min(*left);
+        let share = effort.patience(spent, *left);
         let mut spend = share;
         let mut best = Some(Leg { path: path.clone(), cost, entry: 0 });
-        self.improve(attempt, problem, goal, &mut best, &mut spend);
+        self.improve(attempt, problem, goal, &mut best, effort.enough(), &mut spend);
         *left -= share - spend;
         let Some(found) = best.filter(|leg| leg.path != path) else { return path };
         let estimates = self.queue.curve_estimates(&problem.vehicle, &model);
@@ -390,10 +384,8 @@ impl Planner for HybridAStar {
         let mut left = budget.max_expansions;
         let leg = self.leg(problem, problem.start, &goal, &mut left);
         let spent = budget.max_expansions - left;
-        let path = leg.map(|leg| match self.refines {
-            true => self.refine(problem, &goal, leg.path, PATIENCE.max(2 * spent), &mut left),
-            false => leg.path,
-        });
+        let effort = budget.effort;
+        let path = leg.map(|leg| self.refine(problem, &goal, leg.path, effort, spent, &mut left));
         let expansions = budget.max_expansions - left;
         match path {
             Ok(path) => PlanResult::certified(problem, path, expansions),

@@ -375,7 +375,7 @@ mod tests {
     use crate::world::generate::{GeneratorConfig, generate};
     use crate::world::{Level, ParkingType};
 
-    const BUDGET: Budget = Budget { max_expansions: 200_000 };
+    const BUDGET: Budget = Budget::new(200_000);
 
     fn problems(kind: ParkingType, level: Level, seed: u64) -> Vec<Problem> {
         let (config, vehicle) = (GeneratorConfig::default(), Vehicle::default());

@@ -10,6 +10,7 @@
 
 pub mod analytic;
 mod approach;
+mod budget;
 mod config;
 pub mod cost;
 mod cost_to_go;
@@ -29,6 +30,7 @@ mod search;
 mod shortcut;
 
 pub use analytic::AnalyticTail;
+pub use budget::{Budget, Effort};
 pub use config::{GoalRegion, HybridAStarConfig, Resolution};
 pub use hybrid_astar::HybridAStar;
 pub use multi_heuristic::{MultiHeuristicConfig, MultiHeuristicHybridAStar};
@@ -47,14 +49,6 @@ pub trait Planner {
 
     /// Plans one problem. "No path" is a result, not an error.
     fn plan(&mut self, problem: &Problem, budget: Budget) -> PlanResult;
-}
-
-/// How much work a planner may spend. Counts work, never time, so that results are
-/// the same on every machine.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Budget {
-    /// Node expansions over all searches of the call.
-    pub max_expansions: usize,
 }
 
 /// What a planner found, and what it took.

@@ -17,7 +17,8 @@ use crate::geometry::{Pose, Vec2};
 use crate::planners::hybrid_astar::{Entry, GoalSet, Leg};
 use crate::planners::library::{Library, LibraryPlan, LibrarySearch, Verdicts};
 use crate::planners::{
-    Budget, Guidance, HybridAStar, HybridAStarConfig, NoPath, PlanResult, Planner, Problem, Route,
+    Budget, Effort, Guidance, HybridAStar, HybridAStarConfig, NoPath, PlanResult, Planner, Problem,
+    Route,
 };
 use crate::world::ParkingType;
 use crate::world::abstraction::{Abstraction, abstractions};
@@ -50,8 +51,6 @@ const TO_AND_FRO: f64 = 4.0;
 /// many expansions.
 const DOUBTFUL: f64 = 2.0;
 const SECOND_SEARCH: usize = 1500;
-/// Expansions for something better than a plan that was known.
-const PATIENCE: usize = 400;
 /// Those it tries where there is no such curve. Each takes some microseconds, together they take a
 /// quarter of what a search usually does; generated scenes need 24 of them at most.
 const TRIES: usize = 64;
@@ -272,12 +271,13 @@ impl GuidedPlanner {
         &mut self,
         problem: &Problem,
         config: RankedConfig,
+        effort: Effort,
         left: &mut usize,
     ) -> Result<(Path, Guidance), NoPath> {
         let mut goal = self.hars.goal_set(problem);
         let has_library = config.library && self.prepare_library(problem);
         if has_library && let Some(known) = self.look_up(problem, &goal) {
-            return Ok(self.settle(problem, &goal, known, left));
+            return Ok(self.settle(problem, &goal, known, effort, left));
         }
         for found in self.cells(problem).iter().take(config.abstractions) {
             self.select(problem, found, config.candidates);
@@ -303,7 +303,7 @@ impl GuidedPlanner {
             let guidance = guidance(untried.entries().get(leg.entry), Route::Direct);
             let plain = self.hars.goal_set(problem);
             let known = Known { path: leg.path, cost: leg.cost, guidance, least: 0.0 };
-            return Ok(self.settle(problem, &plain, known, left));
+            return Ok(self.settle(problem, &plain, known, effort, left));
         }
         // One search: it begins at the goal and at every preparatory pose.
         let before = *left;
@@ -313,8 +313,8 @@ impl GuidedPlanner {
         let route = if by_way { Route::Searched } else { Route::Fallback };
         let guidance = guidance(entry, route);
         let plain = self.hars.goal_set(problem);
-        let patience = PATIENCE.max(2 * (before - *left));
-        Ok((self.hars.refine(problem, &plain, leg.path, patience, left), guidance))
+        let spent = before - *left;
+        Ok((self.hars.refine(problem, &plain, leg.path, effort, spent, left), guidance))
     }
 
     /// Whether a plan costs no more than usual: what is known of the spot says what it takes; where
@@ -345,8 +345,12 @@ impl GuidedPlanner {
         problem: &Problem,
         goal: &GoalSet,
         mut known: Known,
+        effort: Effort,
         left: &mut usize,
     ) -> (Path, Guidance) {
+        if effort == Effort::First {
+            return (known.path, known.guidance);
+        }
         let is_usual = self.is_usual(problem, goal, &known);
         let apart = problem.start.distance(problem.goal) / problem.vehicle.length;
         let may_go_on = apart < AT_THE_SPOT || (!is_usual && apart < NEAR_GOAL);
@@ -358,7 +362,7 @@ impl GuidedPlanner {
         }
         let Known { path, mut guidance, least, .. } = known;
         let before = *left;
-        let mut refined = self.hars.refine(problem, goal, path.clone(), PATIENCE, left);
+        let mut refined = self.hars.refine(problem, goal, path.clone(), Effort::Usual, 0, left);
         let model = self.hars.cost(&problem.vehicle);
         let cost = |path: &Path| model.path(&problem.vehicle, &path.segments);
         if refined.direction_changes() > 2 && cost(&refined) > DOUBTFUL * least {
@@ -367,17 +371,35 @@ impl GuidedPlanner {
             let found = self.hars.search(problem, problem.start, goal, None, &mut spend);
             *left -= share - spend;
             if let Ok(leg) = found {
-                let found = self.hars.refine(problem, goal, leg.path, PATIENCE, left);
+                let found = self.hars.refine(problem, goal, leg.path, Effort::Usual, 0, left);
                 if cost(&found) < cost(&refined) {
                     refined = found;
                 }
             }
         }
         if refined != path {
-            let route = if *left == before { Route::Direct } else { Route::Searched };
-            guidance = Guidance { preparatory: None, route };
+            guidance = Self::anew(before - *left);
         }
         (refined, guidance)
+    }
+
+    /// A plan, or the best that half of what is left of the budget finds in its place.
+    fn look_again(
+        &mut self,
+        problem: &Problem,
+        (path, guidance): (Path, Guidance),
+        left: &mut usize,
+    ) -> (Path, Guidance) {
+        let (goal, before) = (self.hars.goal_set(problem), *left);
+        let refined = self.hars.refine(problem, &goal, path.clone(), Effort::Most, 0, left);
+        let guidance = if refined == path { guidance } else { Self::anew(before - *left) };
+        (refined, guidance)
+    }
+
+    /// What is said of a plan that took the place of another, after `spent` expansions.
+    fn anew(spent: usize) -> Guidance {
+        let route = if spent == 0 { Route::Direct } else { Route::Searched };
+        Guidance { preparatory: None, route }
     }
 
     /// `pose`, or one beside it, from which a curve leads to the goal, and that curve.
@@ -458,7 +480,13 @@ impl Planner for GuidedPlanner {
                 Some(planned) => Ok(self.or_direct(problem, planned)),
                 None => self.fall_back(problem, &mut left),
             },
-            Strategy::Ranked(config) => self.plan_ranked(problem, config, &mut left),
+            Strategy::Ranked(config) => {
+                let planned = self.plan_ranked(problem, config, budget.effort, &mut left);
+                match budget.effort {
+                    Effort::First | Effort::Usual => planned,
+                    Effort::Most => planned.map(|p| self.look_again(problem, p, &mut left)),
+                }
+            }
         };
         match planned {
             Ok((path, guidance)) => {
