@@ -6,8 +6,8 @@
 mod common;
 
 use criterion::{Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
-use n3p::dataset::CollectConfig;
-use n3p::dataset::sampler::Sampler;
+use n3p::lab::dataset::CollectConfig;
+use n3p::lab::dataset::sampler::Sampler;
 use n3p::world::ParkingType;
 
 const CELLS: usize = 20;

@@ -7,7 +7,7 @@
 mod common;
 
 use criterion::{Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
-use n3p::evaluation::{Method, MethodSettings, Models};
+use n3p::n3p::{Method, MethodSettings, Models};
 use n3p::planners::{Budget, NoPath, Problem};
 use n3p::vehicle::Vehicle;
 use n3p::world::generate::{GeneratorConfig, generate};

@@ -9,16 +9,16 @@ mod common;
 
 use candle_core::Device;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use n3p::evaluation::{Method, Models};
-use n3p::rl::actor::{ActorPolicy, Choice, normal};
-use n3p::rl::courses::{Course, Stratum};
-use n3p::rl::encoding::InputScale;
-use n3p::rl::motion::{action, admitted};
-use n3p::rl::network::ACTION;
-use n3p::rl::parking_env::{EnvConfig, ParkingEnv};
-use n3p::rl::replay::Transition;
-use n3p::rl::sac::{Sac, SacConfig};
-use n3p::rl::{MASK, Observation, Policy};
+use n3p::lab::rl::actor::{ActorPolicy, Choice, normal};
+use n3p::lab::rl::courses::{Course, Stratum};
+use n3p::lab::rl::encoding::InputScale;
+use n3p::lab::rl::motion::{action, admitted};
+use n3p::lab::rl::network::ACTION;
+use n3p::lab::rl::parking_env::{EnvConfig, ParkingEnv};
+use n3p::lab::rl::replay::Transition;
+use n3p::lab::rl::sac::{Sac, SacConfig};
+use n3p::lab::rl::{MASK, Observation, Policy};
+use n3p::n3p::{Method, Models};
 use n3p::rng::{Stream, rng};
 use n3p::vehicle::Vehicle;
 use rand::RngExt;
@@ -70,7 +70,7 @@ impl Side {
 fn bench(c: &mut Criterion) {
     // As every program does that drives or trains policies.
     // SAFETY: the only benchmark of this program, and criterion has started no thread.
-    unsafe { n3p::training::single_threaded() };
+    unsafe { n3p::lab::training::single_threaded() };
     let mut rng = rng(common::SEED, Stream::Policy, 0);
     let mut group = c.benchmark_group("environment");
     group.throughput(Throughput::Elements(ENVIRONMENTS));

@@ -8,7 +8,7 @@ mod common;
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use n3p::evaluation::{Method, Models};
+use n3p::n3p::{Method, Models};
 use n3p::vehicle::Vehicle;
 use n3p::world::ParkingType;
 

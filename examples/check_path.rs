@@ -11,9 +11,9 @@
 use std::path::Path;
 
 use anyhow::Result;
-use n3p::evaluation::PathFile;
-use n3p::evaluation::oracle::{self, Violation};
 use n3p::geometry::Pose;
+use n3p::lab::evaluation::oracle::{self, Violation};
+use n3p::output::PathFile;
 use n3p::world::Scene;
 
 fn main() -> Result<()> {

@@ -20,8 +20,11 @@
 //! blocked, how many of its paths hit (*collisions*) a true obstacle, and their mean length.
 //! Points have no inside, which does not matter here: no gap between them lets a car through.
 
-use n3p::evaluation::oracle::{self, Violation};
-use n3p::evaluation::{Case, Method, MethodSettings, Models, PathFile, suite};
+use n3p::episode::Case;
+use n3p::lab::evaluation::oracle::{self, Violation};
+use n3p::lab::evaluation::suite;
+use n3p::n3p::{Method, MethodSettings, Models};
+use n3p::output::PathFile;
 use n3p::planners::{Budget, Planner, Problem};
 use n3p::rng::{Stream, rng};
 use n3p::world::{Level, ParkingType, Scene};

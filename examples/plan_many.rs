@@ -6,7 +6,8 @@
 
 use std::time::Instant;
 
-use n3p::evaluation::{Method, MethodSettings, Models, suite};
+use n3p::lab::evaluation::suite;
+use n3p::n3p::{Method, MethodSettings, Models};
 use n3p::planners::{Budget, Problem};
 use n3p::vehicle::Vehicle;
 use n3p::world::{Level, ParkingType};

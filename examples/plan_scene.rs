@@ -4,9 +4,9 @@
 
 use std::path::Path;
 
+use n3p::n3p::guided::{GuidedPlanner, RankedConfig};
 use n3p::planners::{Budget, HybridAStarConfig, Planner, Problem};
 use n3p::selectors::artefact::Model;
-use n3p::selectors::guided::{GuidedPlanner, RankedConfig};
 use n3p::world::Scene;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -5,7 +5,7 @@
 //! and evaluates.
 //!
 //! A scene becomes a [`planners::Problem`]; a [`planners::Planner`] turns it into a
-//! [`curves::Path`]. N3P itself is [`selectors::guided::GuidedPlanner`]. `examples/plan_scene.rs`
+//! [`curves::Path`]. N3P itself is [`n3p::GuidedPlanner`]. `examples/plan_scene.rs`
 //! shows the three together on one page. Metres, radians, counter-clockwise; a pose is that of
 //! the rear-axle centre.
 //!
@@ -13,37 +13,31 @@
 //!
 //! - [`rng`]: one seed, many named random streams
 //! - [`files`]: files that are whole or absent, and plain words for what fails
-//! - [`progress`]: progress bars
 //! - [`geometry`]: poses, frames, polygons
 //! - [`vehicle`]: dimensions, footprint, kinematics
 //! - [`curves`]: segments, paths, Reeds-Shepp words
 //! - [`world`]: scenes, exact swept collision, cells, the abstraction, the generator
 //! - [`planners`]: the `Planner` trait and Hybrid A* with Reeds-Shepp expansion
-//! - [`nn`]: pieces of neural networks
-//! - [`selectors`]: preparatory poses by KNN and MLP, and N3P itself
-//! - [`rl`]: policies of reinforcement learning, and the environment they park in
-//! - [`dataset`]: collecting samples into Parquet, and reading them back
-//! - [`training`]: rows → artefacts
-//! - [`evaluation`]: episodes, the independent oracle, tables, reports
-//! - [`experiments`]: a whole pipeline from one versioned file
+//! - [`selectors`]: preparatory poses by KNN and MLP
+//! - [`mod@n3p`]: N3P itself, every method by name, and the models that serve a vehicle
+//! - [`output`]: path and trajectory files, pictures
+//! - [`episode`]: one method on one scene, timed and checked
+//! - [`lab`]: what learns and compares: policies, data, training, evaluation, experiments
 //! - [`cli`]: arguments, output and exit codes of the binaries
 
 #![warn(missing_docs)]
 
 pub mod cli;
 pub mod curves;
-pub mod dataset;
-pub mod evaluation;
-pub mod experiments;
+pub mod episode;
 pub mod files;
 pub mod geometry;
-pub mod nn;
+pub mod lab;
+pub mod n3p;
+pub mod output;
 pub mod planners;
-pub mod progress;
-pub mod rl;
 pub mod rng;
 pub mod selectors;
-pub mod training;
 pub mod vehicle;
 pub mod world;
 

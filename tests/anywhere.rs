@@ -6,8 +6,10 @@ mod lots;
 use std::path::Path;
 
 use n3p::curves::TrajectoryLimits;
-use n3p::evaluation::{Method, MethodSettings, Models, PathFile, TrajectoryFile, oracle};
 use n3p::geometry::{Frame, Pose, Vec2, signed_angle};
+use n3p::lab::evaluation::oracle;
+use n3p::n3p::{Method, MethodSettings, Models};
+use n3p::output::{PathFile, TrajectoryFile};
 use n3p::planners::{Budget, Problem};
 use n3p::rng::{Stream, rng};
 use n3p::vehicle::Vehicle;

@@ -1,7 +1,9 @@
 //! The graph-search baselines on generated scenes: their paths hold, and each is what its
 //! description says.
 
-use n3p::evaluation::{Method, MethodSettings, Models, PathFile, oracle};
+use n3p::lab::evaluation::oracle;
+use n3p::n3p::{Method, MethodSettings, Models};
+use n3p::output::PathFile;
 use n3p::planners::{
     Budget, Effort, HybridAStar, HybridAStarConfig, NoPath, PlanResult, Planner, Problem,
 };

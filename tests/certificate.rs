@@ -3,9 +3,9 @@
 use std::f64::consts::{PI, TAU};
 
 use n3p::curves::{Path, Segment};
-use n3p::evaluation::export::PathFile;
-use n3p::evaluation::oracle;
 use n3p::geometry::{Frame, Polygon, Pose, Vec2};
+use n3p::lab::evaluation::oracle;
+use n3p::output::PathFile;
 use n3p::planners::{Budget, HybridAStar, HybridAStarConfig, Planner, Problem, ProblemError};
 use n3p::rng::{Stream, rng};
 use n3p::vehicle::Vehicle;

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use assert_cmd::Command;
-use n3p::evaluation::{PathFile, oracle, rows};
+use n3p::lab::evaluation::{oracle, rows};
+use n3p::output::PathFile;
 use n3p::world::{Level, ParkingType, Scene};
 use predicates::prelude::*;
 use predicates::str::contains;
@@ -259,7 +260,7 @@ fn rows_do_not_depend_on_the_threads() {
             .success()
             .stdout(contains("No failures in 18 rows"));
         let rows = rows::read_csv(&dir.path().join(threads).join("rows.csv")).unwrap();
-        rows.iter().map(rows::Row::untimed).collect::<Vec<_>>()
+        rows.iter().map(n3p::episode::Row::untimed).collect::<Vec<_>>()
     };
     let rows = run("1");
     assert_eq!(rows, run("2"));

@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 
 use assert_cmd::cargo::cargo_bin;
 use fixtures::{assert_same_files, collect, config, files, sample};
-use n3p::dataset::collect::collect_with;
-use n3p::dataset::{CollectConfig, CollectOptions, Dataset, Part};
+use n3p::lab::dataset::collect::collect_with;
+use n3p::lab::dataset::{CollectConfig, CollectOptions, Dataset, Part};
 use n3p::rng::{Stream, rng};
 use n3p::world::ParkingType;
 use n3p::world::ParkingType::{Forward, Reverse};

@@ -6,10 +6,10 @@ use std::fs;
 use std::path::Path;
 
 use fixtures::{assert_same_files, collect, config, sample};
-use n3p::dataset::collect::collect_with;
-use n3p::dataset::schema::FORMAT_VERSION;
-use n3p::dataset::{CollectConfig, CollectOptions, Dataset, DatasetError, Part, Status};
 use n3p::geometry::Pose;
+use n3p::lab::dataset::collect::collect_with;
+use n3p::lab::dataset::schema::FORMAT_VERSION;
+use n3p::lab::dataset::{CollectConfig, CollectOptions, Dataset, DatasetError, Part, Status};
 use n3p::rng::{Stream, rng};
 use n3p::vehicle::Vehicle;
 use n3p::world::ParkingType;

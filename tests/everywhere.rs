@@ -1,8 +1,10 @@
 //! Right everywhere: what holds of plans whatever the scene, its size, and where the car stands.
 
 use n3p::curves::Path;
-use n3p::evaluation::{Method, MethodSettings, Models, PathFile, oracle};
 use n3p::geometry::Pose;
+use n3p::lab::evaluation::oracle;
+use n3p::n3p::{Method, MethodSettings, Models};
+use n3p::output::PathFile;
 use n3p::planners::{Budget, HybridAStarConfig, Planner, Problem};
 use n3p::vehicle::Vehicle;
 use n3p::world::generate::{GeneratorConfig, generate};

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use assert_cmd::Command;
-use n3p::evaluation::rows::{Row, read_csv};
+use n3p::episode::Row;
+use n3p::lab::evaluation::rows::read_csv;
 use predicates::prelude::*;
 use predicates::str::contains;
 

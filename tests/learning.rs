@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use n3p::curves::Segment;
-use n3p::dataset::{Dataset, Metadata, Sample, Status};
 use n3p::geometry::{Pose, signed_angle};
+use n3p::lab::dataset::{Dataset, Metadata, Sample, Status};
+use n3p::lab::training::{self, Loss, MlpConfig, Targets, TrainingError, Validation};
 use n3p::planners::HybridAStarConfig;
 use n3p::rng::{Stream, rng};
 use n3p::selectors::artefact::{Fault, Model, find_model};
@@ -14,7 +15,6 @@ use n3p::selectors::knn_file;
 use n3p::selectors::mlp::MlpSelector;
 use n3p::selectors::network::{LAYERS, LayerWeights, pose_from_outputs};
 use n3p::selectors::{Features, Normaliser, PoseSelector, UNIT_COUNT, UNIT_NAMES};
-use n3p::training::{self, Loss, MlpConfig, Targets, TrainingError, Validation};
 use n3p::vehicle::Vehicle;
 use n3p::world::ParkingType;
 use n3p::world::cell::{Axis, Grid};

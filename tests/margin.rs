@@ -3,10 +3,12 @@
 use std::path::Path;
 
 use assert_cmd::Command;
-use n3p::evaluation::suite::{self, SuiteConfig};
-use n3p::evaluation::{
-    Case, EpisodeConfig, Method, MethodSettings, Models, PathFile, episode, oracle, rows,
-};
+use n3p::episode;
+use n3p::episode::{Case, EpisodeConfig};
+use n3p::lab::evaluation::suite::{self, SuiteConfig};
+use n3p::lab::evaluation::{oracle, rows};
+use n3p::n3p::{Method, MethodSettings, Models};
+use n3p::output::PathFile;
 use n3p::planners::{Budget, Problem};
 use n3p::vehicle::Vehicle;
 use n3p::world::generate::{GeneratorConfig, generate};

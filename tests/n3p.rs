@@ -2,12 +2,14 @@
 
 use n3p::curves::Segment;
 use n3p::curves::reeds_shepp::{Word, words};
-use n3p::evaluation::{Method, MethodSettings, Models, PathFile, oracle, suite};
 use n3p::geometry::Pose;
+use n3p::lab::evaluation::{oracle, suite};
+use n3p::n3p::guided::RankedConfig;
+use n3p::n3p::{Method, MethodSettings, Models};
+use n3p::output::PathFile;
 use n3p::planners::{Budget, HybridAStarConfig, Problem, Route};
 use n3p::selectors::Features;
 use n3p::selectors::artefact::Model;
-use n3p::selectors::guided::RankedConfig;
 use n3p::vehicle::{Gear, Vehicle};
 use n3p::world::abstraction::abstractions;
 use n3p::world::cell::{Cell, Grid};

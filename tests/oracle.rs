@@ -2,9 +2,9 @@
 //! accepts good ones wherever the scene lies.
 
 use n3p::curves::{Path, Segment};
-use n3p::evaluation::PathFile;
-use n3p::evaluation::oracle::{self, Violation};
 use n3p::geometry::{Frame, Pose};
+use n3p::lab::evaluation::oracle::{self, Violation};
+use n3p::output::PathFile;
 use n3p::vehicle::Vehicle;
 use n3p::world::Scene;
 

@@ -1,11 +1,11 @@
 //! Laws of what policies see and do, held against the exact swept check and parry2d.
 
 use n3p::geometry::{Pose, Vec2};
+use n3p::lab::rl::courses::{Course, Stratum};
+use n3p::lab::rl::motion::{self, ActionMask, PARTS, admitted, drive};
+use n3p::lab::rl::parking_env::{End, EnvConfig, ParkingEnv};
+use n3p::lab::rl::{Action, MASK, Observation};
 use n3p::planners::Problem;
-use n3p::rl::courses::{Course, Stratum};
-use n3p::rl::motion::{self, ActionMask, PARTS, admitted, drive};
-use n3p::rl::parking_env::{End, EnvConfig, ParkingEnv};
-use n3p::rl::{Action, MASK, Observation};
 use n3p::rng::{Stream, rng};
 use n3p::vehicle::Vehicle;
 use parry2d_f64::math::{Pose2, Vector2};

@@ -1,12 +1,14 @@
 //! Policies as planners: rows like any other, failures with a reason.
 
-use n3p::evaluation::oracle;
-use n3p::evaluation::{Case, EpisodeConfig, PathFile, episode};
+use n3p::episode;
+use n3p::episode::{Case, EpisodeConfig};
+use n3p::lab::evaluation::oracle;
+use n3p::lab::rl::courses::{Course, Stratum};
+use n3p::lab::rl::motion::{action, admitted};
+use n3p::lab::rl::rollout::{PolicyPlanner, RolloutConfig};
+use n3p::lab::rl::{Action, MASK, Observation, Policy, PolicyFault};
+use n3p::output::PathFile;
 use n3p::planners::{Budget, HybridAStarConfig, NoPath, PARKED_COVER, Planner, Problem};
-use n3p::rl::courses::{Course, Stratum};
-use n3p::rl::motion::{action, admitted};
-use n3p::rl::rollout::{PolicyPlanner, RolloutConfig};
-use n3p::rl::{Action, MASK, Observation, Policy, PolicyFault};
 use n3p::vehicle::Vehicle;
 use n3p::world::generate::{GeneratorConfig, generate};
 use n3p::world::{Level, ParkingType, Scene};

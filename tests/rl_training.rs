@@ -6,8 +6,8 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use assert_cmd::cargo::cargo_bin;
-use n3p::rl::policy_file;
-use n3p::training::rl::{RlLog, checkpoint_path};
+use n3p::lab::rl::policy_file;
+use n3p::lab::training::rl::{RlLog, checkpoint_path};
 
 /// Small enough for a test: what matters is that everything random takes part.
 const SETTINGS: &str = "

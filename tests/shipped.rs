@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use n3p::dataset::{CollectConfig, Dataset};
-use n3p::experiments::ExperimentConfig;
-use n3p::rl::courses::Course;
-use n3p::rl::policy_file;
+use n3p::lab::dataset::{CollectConfig, Dataset};
+use n3p::lab::experiments::ExperimentConfig;
+use n3p::lab::rl::courses::Course;
+use n3p::lab::rl::policy_file;
+use n3p::lab::training::MlpConfig;
+use n3p::lab::training::rl::{RlConfig, RlLog};
 use n3p::selectors::knn::KnnSelector;
 use n3p::selectors::mlp::MlpSelector;
-use n3p::training::MlpConfig;
-use n3p::training::rl::{RlConfig, RlLog};
 use n3p::world::ParkingType;
 
 fn data(name: &str) -> Dataset {

@@ -4,7 +4,9 @@ use std::path::Path;
 use std::process::Command;
 
 use assert_cmd::cargo::cargo_bin;
-use n3p::evaluation::{Method, MethodSettings, Models, PathFile, oracle};
+use n3p::lab::evaluation::oracle;
+use n3p::n3p::{Method, MethodSettings, Models};
+use n3p::output::PathFile;
 use n3p::planners::{Budget, Problem};
 use n3p::vehicle::Vehicle;
 use n3p::world::generate::{GeneratorConfig, generate};

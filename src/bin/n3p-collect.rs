@@ -6,8 +6,8 @@ use std::time::Instant;
 
 use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput};
-use n3p::dataset::{self, CollectConfig, CollectOptions, Dataset, Part, TypeReport};
-use n3p::progress;
+use n3p::lab::dataset::{self, CollectConfig, CollectOptions, Dataset, Part, TypeReport};
+use n3p::lab::progress;
 use n3p::vehicle::Vehicle;
 use n3p::world::ParkingType;
 

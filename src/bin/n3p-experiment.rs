@@ -6,10 +6,10 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::{Args, Parser, Subcommand};
 use n3p::cli::{self, BadInput, OrBadInput};
-use n3p::evaluation::{report, rows};
-use n3p::experiments::{ExperimentConfig, ExperimentError, Given, runner};
 use n3p::files::reason;
-use n3p::training;
+use n3p::lab::evaluation::{report, rows};
+use n3p::lab::experiments::{ExperimentConfig, ExperimentError, Given, runner};
+use n3p::lab::training;
 use n3p::vehicle::Vehicle;
 
 /// Runs experiments: collect, train, evaluate and report, all from one file.

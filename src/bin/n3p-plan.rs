@@ -9,15 +9,16 @@ use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::curves::TrajectoryLimits;
 use n3p::curves::trajectory::TrajectoryReport;
-use n3p::evaluation::draw::{Drawing, scene_svg};
-use n3p::evaluation::{
-    Case, Episode, EpisodeConfig, Method, MethodSettings, Models, SpotReport, TrajectoryFile,
-    episode, trace,
-};
+use n3p::episode;
+use n3p::episode::{Case, Episode, EpisodeConfig, SpotReport};
+use n3p::output::drawing::{Drawing, scene_svg};
+
 use n3p::files::{check_writable, reason, write_whole};
+use n3p::lab::rl::source::PolicySource;
+use n3p::lab::training;
+use n3p::n3p::{Method, MethodSettings, Models};
+use n3p::output::TrajectoryFile;
 use n3p::planners::{Budget, Effort, Problem};
-use n3p::rl::source::PolicySource;
-use n3p::training;
 use n3p::world::Scene;
 
 /// Plans a path for one parking scene.
@@ -274,7 +275,7 @@ fn picture(scene: &Scene, episode: &Episode, method: Method, models: &Models) ->
     let drawing = Drawing {
         method: Some(method.name()),
         path: path.as_ref(),
-        regions: trace::regions(episode, models),
+        regions: n3p::episode::regions(episode, models),
         preparatory: preparatory.map(|p| frame.world_from_local(p)),
         note: Some(episode.row.reason.as_str()).filter(|r| !r.is_empty()),
     };

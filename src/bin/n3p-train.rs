@@ -7,12 +7,12 @@ use std::time::Instant;
 use candle_core::Device;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use n3p::cli::{self, BadInput, OrBadInput};
-use n3p::dataset::Dataset;
-use n3p::rl::courses::{Course, Stratum};
+use n3p::lab::dataset::Dataset;
+use n3p::lab::rl::courses::{Course, Stratum};
+use n3p::lab::training::quality::{Errors, Reach};
+use n3p::lab::training::rl::{Begin, RlConfig};
+use n3p::lab::training::{self, MlpConfig, TrainingError};
 use n3p::selectors::artefact;
-use n3p::training::quality::{Errors, Reach};
-use n3p::training::rl::{Begin, RlConfig};
-use n3p::training::{self, MlpConfig, TrainingError};
 use n3p::world::ParkingType;
 
 /// Trains selectors from data sets, and driving policies; each becomes one model file.

@@ -8,7 +8,6 @@
 pub mod artefact;
 mod features;
 pub mod fleet;
-pub mod guided;
 pub mod knn;
 pub mod knn_file;
 pub mod mlp;

@@ -1,0 +1,174 @@
+//! One episode: one method on one scene, timed, checked and told.
+
+mod row;
+mod spot_report;
+
+pub use row::Row;
+pub use spot_report::{SpotReport, abstraction, regions};
+
+use std::time::Instant;
+
+use crate::lab::evaluation::oracle;
+use crate::output::PathFile;
+use crate::planners::{Budget, PARKED_COVER, PlanResult, Planner, Problem, ProblemError};
+use crate::world::{Level, ParkingType, Scene};
+
+/// A scene to evaluate, and how it is labelled.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// The scene; its name is unique in a run.
+    pub scene: Scene,
+    /// Parking type, where known.
+    pub kind: Option<ParkingType>,
+    /// Difficulty, for generated scenes.
+    pub level: Option<Level>,
+}
+
+/// How episodes are run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EpisodeConfig {
+    /// How much work a plan may take.
+    pub budget: Budget,
+    /// Clearance that plans keep where start and goal allow it, metres, 0 to 1: see
+    /// [`Problem::with_margin`].
+    pub margin_m: f64,
+    /// At most so many timed runs after the first.
+    pub repeats: usize,
+    /// No further run begins once the runs so far took this long together, seconds.
+    pub repeat_within_s: f64,
+}
+
+impl EpisodeConfig {
+    /// The usual timing and margin with `budget`.
+    pub fn new(budget: Budget) -> Self {
+        Self { budget, margin_m: Problem::MARGIN, repeats: 5, repeat_within_s: 0.05 }
+    }
+}
+
+/// What an episode leaves.
+#[derive(Clone, Debug)]
+pub struct Episode {
+    /// The row.
+    pub row: Row,
+    /// The problem as the planner saw it.
+    pub problem: Problem,
+    /// What the planner returned.
+    pub result: PlanResult,
+    /// The path in the scene's frame, if there is one.
+    pub path: Option<PathFile>,
+}
+
+/// The reason in rows whose path the independent check refuses.
+pub const REJECTED: &str = "rejected by the independent check";
+/// The reason in rows of planners that do not repeat their own result.
+pub const UNREPEATABLE: &str = "two runs gave different results";
+
+/// Runs `planner` on `case`, checks its path and makes the row.
+///
+/// A run is timed from the scene's obstacles in hand to the certified path. The first run
+/// warms caches up: where it is cheap it is thrown away, and the time is the median of
+/// the runs after it. A first run beyond `repeat_within_s` counts itself.
+pub fn run(
+    case: &Case,
+    planner: &mut dyn Planner,
+    config: &EpisodeConfig,
+) -> Result<Episode, ProblemError> {
+    let (problem, result, first_s) = timed(&case.scene, planner, config)?;
+    let mut times = Vec::new();
+    let mut total_s = first_s;
+    let mut repeatable = true;
+    while total_s < config.repeat_within_s && times.len() < config.repeats {
+        let (_, again, seconds) = timed(&case.scene, planner, config)?;
+        repeatable &= again.outcome == result.outcome && again.expansions == result.expansions;
+        times.push(seconds);
+        total_s += seconds;
+    }
+    if times.is_empty() {
+        times.push(first_s);
+    }
+    times.sort_by(f64::total_cmp);
+    let mut row = blank_row(case, planner.name(), times[times.len() / 2]);
+    let path = describe(case, &problem, &result, &mut row);
+    if !repeatable {
+        row.ok = false;
+        row.reason = UNREPEATABLE.to_owned();
+    }
+    Ok(Episode { row, problem, result, path })
+}
+
+fn timed(
+    scene: &Scene,
+    planner: &mut dyn Planner,
+    config: &EpisodeConfig,
+) -> Result<(Problem, PlanResult, f64), ProblemError> {
+    let start = Instant::now();
+    let problem = Problem::with_margin(scene, config.margin_m)?;
+    let result = planner.plan(&problem, config.budget);
+    Ok((problem, result, start.elapsed().as_secs_f64()))
+}
+
+fn blank_row(case: &Case, method: &str, plan_time_s: f64) -> Row {
+    Row {
+        scene: case.scene.name.clone(),
+        kind: case.kind,
+        level: case.level,
+        method: method.to_owned(),
+        ok: false,
+        reason: String::new(),
+        plan_time_s,
+        length_m: None,
+        direction_changes: None,
+        max_abs_steer_rad: None,
+        mean_abs_steer_change_rad: None,
+        nodes: 0,
+        min_clearance_m: None,
+        fallback: false,
+        checked: String::new(),
+        route: String::new(),
+        cost_over_best: None,
+        changes_over_fewest: None,
+    }
+}
+
+/// Fills `row` from the result; returns the exported path, if any.
+fn describe(
+    case: &Case,
+    problem: &Problem,
+    result: &PlanResult,
+    row: &mut Row,
+) -> Option<PathFile> {
+    row.nodes = result.expansions as u32;
+    if let Some(guidance) = &result.guidance {
+        row.fallback = guidance.route.is_fallback();
+        row.route = guidance.route.name().to_owned();
+    }
+    let path = match &result.outcome {
+        Ok(path) => path,
+        Err(reason) => {
+            row.reason = reason.to_string();
+            return None;
+        }
+    };
+    let vehicle = &problem.vehicle;
+    row.length_m = Some(path.length());
+    row.direction_changes = Some(path.direction_changes() as u32);
+    row.max_abs_steer_rad = Some(vehicle.steer(path.max_abs_curvature()));
+    row.mean_abs_steer_change_rad = Some(path.mean_abs_steer_change(vehicle));
+    let file = PathFile::new(&case.scene, &problem.frame, path, &row.method);
+    let checked = match result.covered {
+        None => oracle::check(&case.scene, &file),
+        Some(_) => oracle::check_cover(&case.scene, &file, PARKED_COVER),
+    };
+    match checked {
+        Ok(clearance) => {
+            row.ok = true;
+            row.min_clearance_m = Some(clearance).filter(|c| c.is_finite());
+            row.checked = "ok".to_owned();
+        }
+        Err(violation) => {
+            row.reason = REJECTED.to_owned();
+            row.checked = violation.to_string();
+        }
+    }
+    Some(file)
+}

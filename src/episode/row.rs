@@ -1,0 +1,179 @@
+//! The record of one method on one scene, what every table is made of.
+
+use serde::{Deserialize, Serialize};
+
+use crate::planners::NoPath;
+use crate::world::{Level, ParkingType};
+
+/// The result of one method on one scene. Columns that describe a path are empty where
+/// there is none.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Name of the scene.
+    pub scene: String,
+    /// Its parking type, where known.
+    #[serde(rename = "type")]
+    pub kind: Option<ParkingType>,
+    /// Its difficulty, for generated scenes.
+    pub level: Option<Level>,
+    /// Name of the method.
+    pub method: String,
+    /// Whether there is a path and the independent check accepts it.
+    pub ok: bool,
+    /// Why not; empty when `ok`.
+    pub reason: String,
+    /// From the obstacle points in hand to the certified path, seconds.
+    pub plan_time_s: f64,
+    /// Driven length, metres.
+    pub length_m: Option<f64>,
+    /// Gear changes along the way.
+    pub direction_changes: Option<u32>,
+    /// Largest |δ|, radians.
+    pub max_abs_steer_rad: Option<f64>,
+    /// Mean |δ(t + 0.1 s) − δ(t)|, radians.
+    pub mean_abs_steer_change_rad: Option<f64>,
+    /// Node expansions.
+    pub nodes: u32,
+    /// Smallest distance to an obstacle, metres; empty without obstacles too.
+    pub min_clearance_m: Option<f64>,
+    /// Whether a guided planner had to search the whole way after all.
+    pub fallback: bool,
+    /// Verdict of the independent check: `ok`, the violation, or empty without a path.
+    pub checked: String,
+    /// How a guided planner came to its path: `library`, `direct`, `searched`, `fallback`.
+    pub route: String,
+    /// Cost of the path over that of the cheapest in the scene: see `lab::evaluation::quality`, which
+    /// fills this and the next once a run is complete.
+    pub cost_over_best: Option<f64>,
+    /// Gear changes beyond the fewest of any method in the scene.
+    pub changes_over_fewest: Option<u32>,
+}
+
+impl Row {
+    /// Names of the columns, in order.
+    pub const COLUMNS: [&'static str; 18] = [
+        "scene",
+        "type",
+        "level",
+        "method",
+        "ok",
+        "reason",
+        "plan_time_s",
+        "length_m",
+        "direction_changes",
+        "max_abs_steer_rad",
+        "mean_abs_steer_change_rad",
+        "nodes",
+        "min_clearance_m",
+        "fallback",
+        "checked",
+        "route",
+        "cost_over_best",
+        "changes_over_fewest",
+    ];
+
+    /// How many columns at the end compare a row with others. Files of before have none of them.
+    pub const COMPARING: usize = 2;
+
+    /// Whether the method is made for such scenes. Rows of one that is not are kept, but they
+    /// are no failures and enter no table.
+    pub fn applies(&self) -> bool {
+        self.reason != NoPath::NotApplicable.to_string()
+    }
+
+    /// Whether the independent check refused the path.
+    pub fn is_rejected(&self) -> bool {
+        !self.checked.is_empty() && self.checked != "ok"
+    }
+
+    /// Why it failed, with the check's own words; empty when `ok`.
+    pub fn why(&self) -> String {
+        if self.is_rejected() {
+            format!("{}: {}", self.reason, self.checked)
+        } else {
+            self.reason.clone()
+        }
+    }
+
+    /// Scene and method, which no two rows of a run share.
+    pub fn key(&self) -> (&str, &str) {
+        (&self.scene, &self.method)
+    }
+
+    /// This row without its time: what must be the same in every run.
+    pub fn untimed(&self) -> Row {
+        Row { plan_time_s: 0.0, ..self.clone() }
+    }
+
+    /// The values as text, in the order of [`Row::COLUMNS`].
+    pub fn fields(&self) -> [String; 18] {
+        fn text<T: ToString>(v: &Option<T>) -> String {
+            v.as_ref().map(T::to_string).unwrap_or_default()
+        }
+        [
+            self.scene.clone(),
+            text(&self.kind),
+            text(&self.level),
+            self.method.clone(),
+            self.ok.to_string(),
+            self.reason.clone(),
+            self.plan_time_s.to_string(),
+            text(&self.length_m),
+            text(&self.direction_changes),
+            text(&self.max_abs_steer_rad),
+            text(&self.mean_abs_steer_change_rad),
+            self.nodes.to_string(),
+            text(&self.min_clearance_m),
+            self.fallback.to_string(),
+            self.checked.clone(),
+            self.route.clone(),
+            text(&self.cost_over_best),
+            text(&self.changes_over_fewest),
+        ]
+    }
+
+    /// The row as one line of CSV, line break included.
+    pub fn to_csv(&self) -> String {
+        self.fields().map(|f| quoted(&f)).join(",") + "\n"
+    }
+
+    pub(crate) fn from_fields(f: &[String]) -> Result<Row, String> {
+        if f.len() != Self::COLUMNS.len() {
+            return Err(format!("has {} columns; expected {}", f.len(), Self::COLUMNS.len()));
+        }
+        fn parse<T: std::str::FromStr>(f: &[String], i: usize) -> Result<T, String> {
+            f[i].parse().map_err(|_| format!("{} is \"{}\"", Row::COLUMNS[i], f[i]))
+        }
+        fn maybe<T: std::str::FromStr>(f: &[String], i: usize) -> Result<Option<T>, String> {
+            if f[i].is_empty() { Ok(None) } else { parse(f, i).map(Some) }
+        }
+        Ok(Row {
+            scene: f[0].clone(),
+            kind: maybe(f, 1)?,
+            level: maybe(f, 2)?,
+            method: f[3].clone(),
+            ok: parse(f, 4)?,
+            reason: f[5].clone(),
+            plan_time_s: parse(f, 6)?,
+            length_m: maybe(f, 7)?,
+            direction_changes: maybe(f, 8)?,
+            max_abs_steer_rad: maybe(f, 9)?,
+            mean_abs_steer_change_rad: maybe(f, 10)?,
+            nodes: parse(f, 11)?,
+            min_clearance_m: maybe(f, 12)?,
+            fallback: parse(f, 13)?,
+            checked: f[14].clone(),
+            route: f[15].clone(),
+            cost_over_best: maybe(f, 16)?,
+            changes_over_fewest: maybe(f, 17)?,
+        })
+    }
+}
+
+fn quoted(field: &str) -> String {
+    if field.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", field.replace('"', "\"\"").replace('\n', " "))
+    } else {
+        field.to_owned()
+    }
+}

@@ -1,0 +1,480 @@
+//! The independent check of exported paths.
+//!
+//! Written apart from the planner: it reads the scene and the path file alone, drives
+//! the path with its own arithmetic, and asks parry2d about footprints every centimetre.
+//! It shares no code with [`crate::curves`] or [`crate::world::collision`], so that one
+//! mistake cannot hide in both.
+//!
+//! A solid polygon touches the (convex) footprint if and only if one of its edges does or
+//! it contains the footprint's centre; this needs no decomposition and holds for any
+//! simple polygon. Footprints are tested shrunk by [`PENETRATION_TOL`].
+
+use std::f64::consts::TAU;
+
+use parry2d_f64::math::{Pose2, Vector2};
+use parry2d_f64::query::{self, PointQuery};
+use parry2d_f64::shape::{Cuboid, Segment};
+use parry2d_f64::transformation::convex_polygons_intersection_points;
+use parry2d_f64::utils::point_in_poly2d;
+
+use crate::geometry::Pose;
+use crate::output::PathFile;
+use crate::vehicle::Vehicle;
+use crate::world::Scene;
+
+/// Footprints are tested at most this far apart along the path, metres; no corner moves more
+/// than twice this between them. For vehicles shorter than [`CHECK_LENGTH`] in proportion.
+pub const CHECK_STEP: f64 = 0.01;
+/// Vehicles from this length on are tested every [`CHECK_STEP`], metres.
+pub const CHECK_LENGTH: f64 = 4.0;
+/// Poses may be this far apart, metres.
+pub const MAX_SPACING: f64 = 0.1;
+/// How deep a footprint may reach into an obstacle, metres.
+pub const PENETRATION_TOL: f64 = 1e-4;
+/// How near the ends must be to start and goal, metres and radians.
+pub const END_TOL: f64 = 1e-6;
+/// How near each pose must be to where gear and steering lead from the one before,
+/// metres and radians: wide enough for an end that was snapped by [`END_TOL`].
+pub const MOTION_TOL: f64 = 1e-5;
+/// To these, and to bounds, comes what coordinates do not resolve where the scene lies: so many times
+/// the distance between neighbouring numbers. Below a nanometre on a city's map, half a micrometre
+/// 10⁶ km away.
+pub const ROUNDING_STEPS: f64 = 4.0;
+/// Relative excess of the curvature limit that passes.
+pub const CURVATURE_TOL: f64 = 1e-6;
+
+/// Why a path is not what it claims to be. Indices count exported poses from 0.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Violation {
+    /// The arrays have different lengths, or none at all.
+    #[error("{poses} poses, {gears} gears, {steer} steering angles: not a path")]
+    Shape {
+        /// Number of poses.
+        poses: usize,
+        /// Number of gears.
+        gears: usize,
+        /// Number of steering angles.
+        steer: usize,
+    },
+    /// A number is NaN or infinite, or a gear neither 1 nor −1.
+    #[error("pose {pose}: not a finite pose with gear 1 or -1")]
+    NotANumber {
+        /// Index of the pose.
+        pose: usize,
+    },
+    /// The path does not begin at the scene's start.
+    #[error("begins {mm:.3} mm and {rad:.2e} rad from the start")]
+    Start {
+        /// Distance, millimetres.
+        mm: f64,
+        /// Difference of heading, radians.
+        rad: f64,
+    },
+    /// The path does not end at the scene's goal.
+    #[error("ends {mm:.3} mm and {rad:.2e} rad from the goal")]
+    Goal {
+        /// Distance, millimetres.
+        mm: f64,
+        /// Difference of heading, radians.
+        rad: f64,
+    },
+    /// The car covers less of its parked footprint at the end than it should.
+    #[error("ends where {covered:.4} of the parked footprint is covered, expected {share:.4}")]
+    Cover {
+        /// Share covered.
+        covered: f64,
+        /// Share wanted.
+        share: f64,
+    },
+    /// Two successive poses are too far apart.
+    #[error("pose {pose}: the next one is {metres:.3} m away")]
+    Spacing {
+        /// Index of the first of the two.
+        pose: usize,
+        /// Their distance, metres.
+        metres: f64,
+    },
+    /// The steering angle is beyond the vehicle's limit.
+    #[error("pose {pose}: curvature {curvature:.6} beyond the limit {limit:.6} (1/m)")]
+    Curvature {
+        /// Index of the pose.
+        pose: usize,
+        /// |curvature| there, 1/m.
+        curvature: f64,
+        /// The vehicle's limit, 1/m.
+        limit: f64,
+    },
+    /// The motion goes against its gear.
+    #[error("pose {pose}: moves against gear {gear}")]
+    Gear {
+        /// Index of the pose.
+        pose: usize,
+        /// The gear it claims.
+        gear: i8,
+    },
+    /// Gear and steering do not lead to the next pose.
+    #[error("pose {pose}: gear and steering end {mm:.3} mm and {rad:.2e} rad from the next pose")]
+    Motion {
+        /// Index of the pose.
+        pose: usize,
+        /// Distance, millimetres.
+        mm: f64,
+        /// Difference of heading, radians.
+        rad: f64,
+    },
+    /// The rear axle leaves the bounds.
+    #[error("pose {pose}: the rear axle is {mm:.3} mm out of bounds")]
+    OutOfBounds {
+        /// Index of the pose at or before it.
+        pose: usize,
+        /// How far, millimetres.
+        mm: f64,
+    },
+    /// The footprint reaches into an obstacle.
+    #[error("pose {pose}: the footprint reaches {mm:.1} mm into {obstacle}")]
+    Collision {
+        /// Index of the pose at or before it.
+        pose: usize,
+        /// How deep, millimetres: the footprint shrunk by this is free.
+        mm: f64,
+        /// Which obstacle, such as `polygon 3`.
+        obstacle: String,
+    },
+}
+
+/// Checks a path file against its scene. Returns the smallest distance between footprint
+/// and obstacles, metres (infinite without obstacles, 0 on contact).
+pub fn check(scene: &Scene, path: &PathFile) -> Result<f64, Violation> {
+    Oracle::new(scene).check(path, None)
+}
+
+/// [`check`] for a path that need not end at the goal, but where at least `share` of the parked
+/// footprint is covered.
+pub fn check_cover(scene: &Scene, path: &PathFile, share: f64) -> Result<f64, Violation> {
+    Oracle::new(scene).check(path, Some(share))
+}
+
+/// A rear-axle pose in local coordinates.
+#[derive(Clone, Copy)]
+struct State {
+    position: Vector2,
+    heading: f64,
+}
+
+impl State {
+    /// After the signed arc length `s` at `curvature`: the chord of the arc, at the
+    /// mean heading.
+    fn driven(self, curvature: f64, s: f64) -> State {
+        let turn = curvature * s;
+        let half = turn / 2.0;
+        let chord = if half.abs() < 1e-8 { s } else { s * half.sin() / half };
+        let (sin, cos) = (self.heading + half).sin_cos();
+        State {
+            position: self.position + Vector2::new(cos, sin) * chord,
+            heading: self.heading + turn,
+        }
+    }
+
+    /// Distance and difference of heading, both ≥ 0.
+    fn apart(self, other: State) -> (f64, f64) {
+        let turn = self.heading - other.heading;
+        ((self.position - other.position).length(), (turn - TAU * (turn / TAU).round()).abs())
+    }
+}
+
+/// An axis-aligned box.
+#[derive(Clone, Copy)]
+struct Extent {
+    min: Vector2,
+    max: Vector2,
+}
+
+impl Extent {
+    fn around(points: &[Vector2]) -> Self {
+        let start = Self { min: Vector2::INFINITY, max: Vector2::NEG_INFINITY };
+        points.iter().fold(start, |e, &p| Self { min: e.min.min(p), max: e.max.max(p) })
+    }
+
+    /// Distance between the boxes; 0 where they overlap.
+    fn gap(&self, other: &Extent) -> f64 {
+        (self.min - other.max).max(other.min - self.max).max(Vector2::ZERO).length()
+    }
+}
+
+/// A solid polygon with its edges.
+struct Solid {
+    vertices: Vec<Vector2>,
+    extent: Extent,
+    edges: Vec<(Segment, Extent)>,
+}
+
+impl Solid {
+    fn new(vertices: Vec<Vector2>) -> Self {
+        let next = vertices.iter().cycle().skip(1);
+        let edges = vertices.iter().zip(next);
+        Self {
+            extent: Extent::around(&vertices),
+            edges: edges.map(|(&a, &b)| (Segment::new(a, b), Extent::around(&[a, b]))).collect(),
+            vertices,
+        }
+    }
+}
+
+/// The footprint at one pose.
+struct Body {
+    pose: Pose2,
+    half: Vector2,
+    extent: Extent,
+}
+
+impl Body {
+    fn new(vehicle: &Vehicle, at: State) -> Self {
+        let (sin, cos) = at.heading.sin_cos();
+        let offset = vehicle.length / 2.0 - vehicle.rear_overhang;
+        let center = at.position + Vector2::new(cos, sin) * offset;
+        let half = Vector2::new(vehicle.length, vehicle.width) / 2.0;
+        let (sin, cos) = (sin.abs(), cos.abs());
+        let reach = Vector2::new(cos * half.x + sin * half.y, sin * half.x + cos * half.y);
+        let extent = Extent { min: center - reach, max: center + reach };
+        Self { pose: Pose2::new(center, at.heading), half, extent }
+    }
+
+    fn center(&self) -> Vector2 {
+        self.pose.translation
+    }
+
+    /// Share of the footprint that `other`, of the same vehicle, covers.
+    fn covered_by(&self, other: &Body) -> f64 {
+        let corners = |body: &Body| {
+            let Vector2 { x, y } = body.half;
+            let signs = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+            signs.map(|(i, j)| body.pose * Vector2::new(i * x, j * y))
+        };
+        let mut common = Vec::new();
+        convex_polygons_intersection_points(&corners(self), &corners(other), &mut common);
+        let next = common.iter().cycle().skip(1);
+        let twice: f64 = common.iter().zip(next).map(|(a, b)| a.perp_dot(*b)).sum();
+        twice.abs() / 2.0 / (4.0 * self.half.x * self.half.y)
+    }
+
+    /// The rectangle, smaller by `margin` metres on every side.
+    fn shrunk(&self, margin: f64) -> Cuboid {
+        Cuboid::new((self.half - Vector2::splat(margin)).max(Vector2::splat(1e-9)))
+    }
+
+    fn distance_to_edge(&self, edge: &Segment) -> f64 {
+        query::distance(&self.pose, &self.shrunk(0.0), &Pose2::IDENTITY, edge)
+            .expect("parry measures boxes and segments")
+            .distance
+    }
+
+    fn distance_to_point(&self, point: Vector2) -> f64 {
+        self.shrunk(0.0).distance_to_point(&self.pose, point, true)
+    }
+
+    fn touches_edge(&self, edge: &Segment, margin: f64) -> bool {
+        query::intersection_test(&self.pose, &self.shrunk(margin), &Pose2::IDENTITY, edge)
+            .expect("parry intersects boxes and segments")
+            .intersecting
+    }
+
+    fn touches_point(&self, point: Vector2, margin: f64) -> bool {
+        self.shrunk(margin).contains_point(&self.pose, point)
+    }
+
+    /// How deep something reaches in, millimetres: the shrinking that frees the
+    /// footprint of it. `None` within [`PENETRATION_TOL`].
+    fn depth_mm(&self, touches: impl Fn(f64) -> bool) -> Option<f64> {
+        if !touches(PENETRATION_TOL) {
+            return None;
+        }
+        let (mut touching, mut free) = (PENETRATION_TOL, self.half.x.min(self.half.y));
+        while free - touching > 1e-5 {
+            let middle = (touching + free) / 2.0;
+            if touches(middle) {
+                touching = middle;
+            } else {
+                free = middle;
+            }
+        }
+        Some(touching * 1e3)
+    }
+}
+
+/// A scene made ready, in coordinates relative to its start: scenes may lie anywhere.
+struct Oracle {
+    origin: Vector2,
+    /// How far rounding may put a pose aside, metres.
+    rounding: f64,
+    vehicle: Vehicle,
+    start: State,
+    goal: State,
+    bounds: Option<Extent>,
+    solids: Vec<Solid>,
+    points: Vec<Vector2>,
+}
+
+impl Oracle {
+    fn new(scene: &Scene) -> Self {
+        let origin = Vector2::new(scene.start.x, scene.start.y);
+        let local = |x: f64, y: f64| Vector2::new(x, y) - origin;
+        let locals = |v: &[[f64; 2]]| v.iter().map(|&[x, y]| local(x, y)).collect::<Vec<_>>();
+        let state = |p: Pose| State { position: local(p.x, p.y), heading: p.heading };
+        Self {
+            origin,
+            rounding: ROUNDING_STEPS * scene.start.resolution().max(scene.goal.resolution()),
+            vehicle: scene.vehicle,
+            start: state(scene.start),
+            goal: state(scene.goal),
+            bounds: scene
+                .bounds
+                .map(|[x0, y0, x1, y1]| Extent { min: local(x0, y0), max: local(x1, y1) }),
+            solids: scene.obstacles.iter().map(|o| Solid::new(locals(o))).collect(),
+            points: locals(&scene.points),
+        }
+    }
+
+    fn check(&self, path: &PathFile, share: Option<f64>) -> Result<f64, Violation> {
+        let n = path.poses.len();
+        if n == 0 || path.gears.len() != n || path.steer.len() != n {
+            return Err(Violation::Shape {
+                poses: n,
+                gears: path.gears.len(),
+                steer: path.steer.len(),
+            });
+        }
+        for i in 0..n {
+            let finite = path.poses[i].iter().all(|v| v.is_finite()) && path.steer[i].is_finite();
+            if !finite || !matches!(path.gears[i], 1 | -1) {
+                return Err(Violation::NotANumber { pose: i });
+            }
+        }
+        let state = |i: usize| {
+            let [x, y, heading] = path.poses[i];
+            State { position: Vector2::new(x, y) - self.origin, heading }
+        };
+        let (metres, rad) = state(0).apart(self.start);
+        if metres > END_TOL + self.rounding || rad > END_TOL {
+            return Err(Violation::Start { mm: metres * 1e3, rad });
+        }
+        self.end(state(n - 1), share)?;
+        let step = CHECK_STEP * (self.vehicle.length / CHECK_LENGTH).min(1.0);
+        let mut clearance = f64::INFINITY;
+        for i in 0..n - 1 {
+            let (curvature, s) =
+                self.motion(i, state(i), state(i + 1), path.gears[i], path.steer[i])?;
+            let steps = (self.corner_motion(curvature, s) / step).ceil().max(1.0) as usize;
+            for k in 0..steps {
+                let at = state(i).driven(curvature, s * k as f64 / steps as f64);
+                self.footprint(i, at, &mut clearance)?;
+            }
+        }
+        self.footprint(n - 1, state(n - 1), &mut clearance)?;
+        Ok(clearance)
+    }
+
+    /// How far the rear axle drives, or half of how far any corner may move, whichever is more.
+    fn corner_motion(&self, curvature: f64, s: f64) -> f64 {
+        let v = &self.vehicle;
+        let reach = v.rear_overhang.max(v.length - v.rear_overhang).hypot(v.width / 2.0);
+        s.abs() * 0.5_f64.mul_add(curvature.abs() * reach, 0.5).max(1.0)
+    }
+
+    /// Whether `end` is the goal, or covers a `share` of the parked footprint.
+    fn end(&self, end: State, share: Option<f64>) -> Result<(), Violation> {
+        let Some(share) = share else {
+            let (metres, rad) = end.apart(self.goal);
+            let at_goal = metres <= END_TOL + self.rounding && rad <= END_TOL;
+            return at_goal.then_some(()).ok_or(Violation::Goal { mm: metres * 1e3, rad });
+        };
+        let body = |state| Body::new(&self.vehicle, state);
+        let covered = body(self.goal).covered_by(&body(end));
+        if covered >= share - 1e-9 { Ok(()) } else { Err(Violation::Cover { covered, share }) }
+    }
+
+    /// Curvature and signed length of the motion from `from` to `to`, or what is wrong
+    /// with it.
+    fn motion(
+        &self,
+        pose: usize,
+        from: State,
+        to: State,
+        gear: i8,
+        steer: f64,
+    ) -> Result<(f64, f64), Violation> {
+        let curvature = steer.tan() / self.vehicle.wheelbase;
+        let limit = self.vehicle.max_steer.tan() / self.vehicle.wheelbase;
+        if curvature.abs() > limit * (1.0 + CURVATURE_TOL) || steer.abs() >= TAU / 4.0 {
+            return Err(Violation::Curvature { pose, curvature: curvature.abs(), limit });
+        }
+        let step = to.position - from.position;
+        let chord = step.length();
+        if chord > MAX_SPACING + 1e-9 {
+            return Err(Violation::Spacing { pose, metres: chord });
+        }
+        let (sin, cos) = from.heading.sin_cos();
+        let along = step.dot(Vector2::new(cos, sin));
+        if along * f64::from(gear) < -(MOTION_TOL + self.rounding) {
+            return Err(Violation::Gear { pose, gear });
+        }
+        // The arc over a chord: c = 2/κ · sin(κ s / 2).
+        let half = curvature.abs() * chord / 2.0;
+        let arc = if half < 1e-8 { chord } else { 2.0 / curvature.abs() * half.min(1.0).asin() };
+        let s = arc * f64::from(gear);
+        let (metres, rad) = from.driven(curvature, s).apart(to);
+        // A chord that is a little too long turns a little too far.
+        let turn = self.rounding * curvature.abs();
+        if metres > MOTION_TOL + self.rounding || rad > MOTION_TOL + turn {
+            return Err(Violation::Motion { pose, mm: metres * 1e3, rad });
+        }
+        Ok((curvature, s))
+    }
+
+    /// Tests one footprint, and lowers `clearance` to its distance from the obstacles.
+    fn footprint(&self, pose: usize, at: State, clearance: &mut f64) -> Result<(), Violation> {
+        if let Some(Extent { min, max }) = self.bounds {
+            let out = (min - at.position).max(at.position - max).max_element();
+            if out > END_TOL + self.rounding {
+                return Err(Violation::OutOfBounds { pose, mm: out * 1e3 });
+            }
+        }
+        let body = Body::new(&self.vehicle, at);
+        let collision = |mm, obstacle| Err(Violation::Collision { pose, mm, obstacle });
+        // Whatever is farther than the nearest so far can neither touch nor lower it.
+        let far = |extent: &Extent, nearest: f64| {
+            let gap = extent.gap(&body.extent);
+            gap > 0.0 && gap >= nearest
+        };
+        for (i, solid) in self.solids.iter().enumerate() {
+            if far(&solid.extent, *clearance) {
+                continue;
+            }
+            if point_in_poly2d(body.center(), &solid.vertices) {
+                return collision(body.half.min_element() * 1e3, format!("polygon {i}"));
+            }
+            for (edge, extent) in &solid.edges {
+                if far(extent, *clearance) {
+                    continue;
+                }
+                *clearance = clearance.min(body.distance_to_edge(edge));
+                if *clearance <= 0.0
+                    && let Some(mm) = body.depth_mm(|margin| body.touches_edge(edge, margin))
+                {
+                    return collision(mm, format!("polygon {i}"));
+                }
+            }
+        }
+        for (i, &point) in self.points.iter().enumerate() {
+            if far(&Extent { min: point, max: point }, *clearance) {
+                continue;
+            }
+            *clearance = clearance.min(body.distance_to_point(point));
+            if *clearance <= 0.0
+                && let Some(mm) = body.depth_mm(|margin| body.touches_point(point, margin))
+            {
+                return collision(mm, format!("point {i}"));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,245 @@
+//! Many episodes: every method on every scene, in a fixed order whatever the threads.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc;
+
+use crate::episode::{self, Case, Episode, EpisodeConfig, Row};
+use crate::n3p::{Method, MethodError, MethodSettings};
+use crate::n3p::{Models, ModelsError};
+use crate::planners::{Budget, Planner, Problem, ProblemError};
+use crate::vehicle::Vehicle;
+use crate::world::generate::{GeneratorConfig, GeneratorError, generate};
+use crate::world::scene::SceneError;
+use crate::world::{Level, ParkingType, Scene};
+
+/// What to run on the scenes.
+#[derive(Clone, Debug)]
+pub struct SuiteConfig {
+    /// The methods, in the order of the rows.
+    pub methods: Vec<Method>,
+    /// Settings of the planners.
+    pub settings: MethodSettings,
+    /// Budget of an episode.
+    pub budget: Budget,
+    /// Clearance that plans keep where start and goal allow it, metres, 0 to 1: see
+    /// [`Problem::with_margin`].
+    pub margin_m: f64,
+    /// Worker threads. More than one disturbs the times, never the results.
+    pub threads: usize,
+}
+
+/// A suite that cannot run.
+#[derive(Debug, thiserror::Error)]
+pub enum SuiteError {
+    /// A scene cannot be read.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// There is nothing to evaluate.
+    #[error("{0}")]
+    NoScenes(String),
+    /// Two scenes share a name, so their rows could not be told apart.
+    #[error("scene name \"{0}\" occurs twice; give every scene a name of its own")]
+    SameName(String),
+    /// A method is named twice, so its rows and paths could not be told apart.
+    #[error("--methods names {0} twice; once is enough")]
+    SameMethod(Method),
+    /// A scene has no solution by its own data.
+    #[error("scene {scene}: {error}; move it, or leave this scene out")]
+    Unsolvable {
+        /// Name of the scene.
+        scene: String,
+        /// What is wrong with it.
+        error: ProblemError,
+    },
+    /// A method cannot be built.
+    #[error(transparent)]
+    Method(#[from] MethodError),
+    /// No scenes can be generated for the vehicle.
+    #[error("no scenes for this vehicle: {0}")]
+    Generator(#[from] GeneratorError),
+    /// A model does not fit.
+    #[error(transparent)]
+    Models(#[from] ModelsError),
+}
+
+/// The most scenes of one type and level: they are held in memory.
+pub const MAX_COUNT: usize = 100_000;
+
+/// Generated scenes: `count` of each type and level, a function of the seed alone.
+pub fn generated(
+    vehicle: &Vehicle,
+    kinds: &[ParkingType],
+    levels: &[Level],
+    count: usize,
+    seed: u64,
+) -> Result<Vec<Case>, SuiteError> {
+    let config = GeneratorConfig::default();
+    config.validate(vehicle)?;
+    let mut cases = Vec::new();
+    for &kind in kinds {
+        for &level in levels {
+            for index in 0..count as u64 {
+                let scene = generate(&config, vehicle, kind, level, seed, index);
+                cases.push(Case { scene, kind: Some(kind), level: Some(level) });
+            }
+        }
+    }
+    Ok(cases)
+}
+
+/// What a folder of scene files holds.
+#[derive(Debug)]
+pub struct Folder {
+    /// The scenes that can be planned.
+    pub cases: Vec<Case>,
+    /// Why other files cannot be used, one line each.
+    pub unusable: Vec<String>,
+    /// How many scene files there are.
+    pub files: usize,
+}
+
+impl Folder {
+    /// How many files could not be used, in words; `None` if all could.
+    pub fn complaint(&self) -> Option<String> {
+        let (bad, files) = (self.unusable.len(), self.files);
+        let noun = if files == 1 { "file" } else { "files" };
+        (bad > 0).then(|| format!("{bad} of {files} {noun} could not be used"))
+    }
+}
+
+/// The scenes of a folder, of one parking type if `kind` is given. Files that hold no scene, or one
+/// whose start or goal is not free with `margin_m`, are left out and named. Where that leaves
+/// nothing, or there is nothing, it is an error.
+pub fn from_folder(
+    dir: &Path,
+    kind: Option<ParkingType>,
+    margin_m: f64,
+) -> Result<Folder, SuiteError> {
+    let read = Scene::read_each(dir)?;
+    let mut folder = Folder { cases: Vec::new(), unusable: Vec::new(), files: read.len() };
+    for (path, scene) in read {
+        let scene = match scene {
+            Ok(scene) if kind.is_some() && scene.parking_type != kind => continue,
+            Ok(scene) => scene,
+            Err(error) => {
+                folder.unusable.push(error.to_string());
+                continue;
+            }
+        };
+        match Problem::with_margin(&scene, margin_m) {
+            Ok(_) => folder.cases.push(Case { kind: scene.parking_type, level: None, scene }),
+            Err(error) => {
+                let scene = format!("{} ({})", scene.name, path.display());
+                folder.unusable.push(SuiteError::Unsolvable { scene, error }.to_string());
+            }
+        }
+    }
+    match (&folder.cases[..], &folder.unusable[..]) {
+        ([], []) => {
+            let what = kind.map_or(String::new(), |k| format!(" of type {k}"));
+            Err(SuiteError::NoScenes(format!(
+                "{}: holds no scenes{what}; expected .json or .csv scene files",
+                dir.display()
+            )))
+        }
+        ([], [first, ..]) => {
+            let what = kind.map_or(String::new(), |k| format!("no other is of type {k}; "));
+            let complaint = folder.complaint().expect("one is named");
+            Err(SuiteError::NoScenes(format!("{complaint}; {what}the first: {first}")))
+        }
+        _ => Ok(folder),
+    }
+}
+
+/// Checks, before anything runs, that every method can be built and every scene planned.
+pub fn check(cases: &[Case], models: &Models, config: &SuiteConfig) -> Result<(), SuiteError> {
+    let mut names = std::collections::HashSet::new();
+    config.build_all(models)?;
+    for (i, method) in config.methods.iter().enumerate() {
+        if config.methods[..i].contains(method) {
+            return Err(SuiteError::SameMethod(*method));
+        }
+    }
+    for case in cases {
+        let scene = &case.scene;
+        if !names.insert(&scene.name) {
+            return Err(SuiteError::SameName(scene.name.clone()));
+        }
+        for &method in &config.methods {
+            models.check_vehicle(method, &scene.name, &scene.vehicle)?;
+            if let Some(kind) = case.kind {
+                models.check_kind(method, &scene.vehicle, kind)?;
+            }
+        }
+        Problem::with_margin(scene, config.margin_m)
+            .map_err(|error| SuiteError::Unsolvable { scene: scene.name.clone(), error })?;
+    }
+    Ok(())
+}
+
+impl SuiteConfig {
+    /// The planners of all methods, in their order.
+    pub fn build_all(&self, models: &Models) -> Result<Vec<Box<dyn Planner + Send>>, MethodError> {
+        self.methods.iter().map(|m| m.build(models, &self.settings)).collect()
+    }
+}
+
+/// Runs every method on every case and hands each episode to `sink`, scene by scene and
+/// method by method, as soon as it and all before it are done. The first `skip` episodes
+/// of that order are left out: those an interrupted run has done already.
+///
+/// Returns the rows of this run, or the first error of `sink`.
+pub fn run<E>(
+    cases: &[Case],
+    models: &Models,
+    config: &SuiteConfig,
+    skip: usize,
+    mut sink: impl FnMut(&Case, &Episode) -> Result<(), E>,
+) -> Result<Vec<Row>, E>
+where
+    E: From<SuiteError>,
+{
+    check(cases, models, config)?;
+    // Here and not in the workers: what was built for the check can fail the next time, such as a
+    // program that is started anew.
+    let planners = (0..config.threads.max(1)).map(|_| config.build_all(models));
+    let planners: Vec<_> = planners.collect::<Result<_, _>>().map_err(SuiteError::from)?;
+    let per_case = config.methods.len();
+    let total = cases.len() * per_case;
+    let next = AtomicUsize::new(skip);
+    let (send, receive) = mpsc::channel();
+    std::thread::scope(|scope| {
+        for mut planners in planners {
+            let (send, next) = (send.clone(), &next);
+            scope.spawn(move || {
+                let usual = EpisodeConfig::new(config.budget);
+                let episodes = EpisodeConfig { margin_m: config.margin_m, ..usual };
+                loop {
+                    let job = next.fetch_add(1, Ordering::Relaxed);
+                    if job >= total {
+                        break;
+                    }
+                    let (case, planner) = (&cases[job / per_case], &mut planners[job % per_case]);
+                    let episode = episode::run(case, planner.as_mut(), &episodes)
+                        .expect("the problem was made once before");
+                    if send.send((job, episode)).is_err() {
+                        break; // The sink failed: nobody listens any more.
+                    }
+                }
+            });
+        }
+        drop(send);
+        let mut waiting = BTreeMap::new();
+        let mut rows = Vec::new();
+        for (job, episode) in receive {
+            waiting.insert(job, episode);
+            while let Some(episode) = waiting.remove(&(skip + rows.len())) {
+                sink(&cases[(skip + rows.len()) / per_case], &episode)?;
+                rows.push(episode.row);
+            }
+        }
+        Ok(rows)
+    })
+}

@@ -1,0 +1,19 @@
+//! The laboratory, above the planner: policies, data, training, evaluation, experiments.
+//!
+//! In reading order; each uses those above it and the planner, never one below.
+//!
+//! - [`progress`]: progress bars
+//! - [`nn`]: pieces of neural networks
+//! - [`rl`]: policies of reinforcement learning, and the environment they park in
+//! - [`dataset`]: collecting samples into Parquet, and reading them back
+//! - [`training`]: rows → artefacts
+//! - [`evaluation`]: the independent oracle, rows, tables, reports
+//! - [`experiments`]: a whole pipeline from one versioned file
+
+pub mod dataset;
+pub mod evaluation;
+pub mod experiments;
+pub mod nn;
+pub mod progress;
+pub mod rl;
+pub mod training;

@@ -1,0 +1,134 @@
+//! Samples → `knn.bin`.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+pub use super::leave_one_out::LeaveOneOut;
+use super::leave_one_out::leave_one_out;
+use super::library::{self, Source};
+use super::{TrainingError, card, solved, write_beside};
+use crate::geometry::Pose;
+use crate::lab::dataset::{Metadata, Sample, content_sha256};
+use crate::selectors::artefact;
+use crate::selectors::knn_file::{self, KindHeader, KnnEntries, KnnEntry, KnnHeader};
+use crate::world::ParkingType;
+
+/// What was stored; written as JSON beside the model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct KnnLog {
+    /// SHA-256 of the data set.
+    pub data_sha256: String,
+    /// Seed of the data set; the training draws no random numbers.
+    pub seed: u64,
+    /// Metres per radian of the metric's heading part; see [`crate::selectors::knn`].
+    pub heading_radius: f64,
+    /// Size of the file, bytes.
+    pub bytes: usize,
+    /// The parking types, in the order of the file.
+    pub kinds: Vec<KnnKindLog>,
+}
+
+/// What was stored of one parking type.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct KnnKindLog {
+    /// The parking type.
+    pub kind: ParkingType,
+    /// Rows of the data set.
+    pub rows: usize,
+    /// Rows stored: the solved ones.
+    pub samples: usize,
+    /// Cells of the grid.
+    pub cells: usize,
+    /// Cells that have a sample.
+    pub occupied_cells: usize,
+    /// Manoeuvres of the library.
+    pub manoeuvres: usize,
+    /// What stored samples' neighbours answer for them; `None` where no cell has two.
+    pub leave_one_out: Option<LeaveOneOut>,
+}
+
+/// Stores the solved samples of `kinds`, and the manoeuvres that serve them, in the file `out`,
+/// with its log and its model card beside it.
+///
+/// A parking type without a solved sample is an error: a selector that knows nothing of it
+/// would be found out only on the road.
+pub fn train(
+    metadata: &Metadata,
+    samples: &[Sample],
+    kinds: &[ParkingType],
+    out: &Path,
+) -> Result<KnnLog, TrainingError> {
+    let mut known = Vec::new();
+    for &kind in kinds {
+        let solved = solved(samples, kind, metadata.grid.cell_count(kind))?;
+        if solved.is_empty() {
+            return Err(TrainingError::NoSamples(kind));
+        }
+        known.push((kind, solved));
+    }
+    let heading_radius = metadata.vehicle.turning_radius() / 2.0;
+    let learnt: Vec<_> = std::thread::scope(|scope| {
+        let learn = |(kind, solved): &(ParkingType, Vec<&Sample>)| {
+            let manoeuvres = library::condense(*kind, &[Source { metadata, solved, unit: 1.0 }]);
+            (manoeuvres, leave_one_out(metadata, solved, heading_radius))
+        };
+        let running: Vec<_> = known.iter().map(|k| scope.spawn(move || learn(k))).collect();
+        running.into_iter().map(|r| r.join().expect("learning does not panic")).collect()
+    });
+    let mut headers = Vec::new();
+    let mut entries = Vec::new();
+    let mut logs = Vec::new();
+    for ((kind, solved), (manoeuvres, leave_one_out)) in known.into_iter().zip(learnt) {
+        let cells = metadata.grid.cell_count(kind);
+        let entry =
+            |s: &&Sample| KnnEntry { cell: s.cell_index, start: s.start, preparatory: s.rs_start };
+        let collected = KnnEntries { samples: solved.iter().map(entry).collect(), manoeuvres };
+        logs.push(KnnKindLog {
+            kind,
+            rows: samples.iter().filter(|s| s.cell.kind == kind).count(),
+            samples: solved.len(),
+            cells,
+            occupied_cells: solved.chunk_by(|a, b| a.cell_index == b.cell_index).count(),
+            manoeuvres: collected.manoeuvres.len(),
+            leave_one_out,
+        });
+        headers.push(KindHeader {
+            kind,
+            cells,
+            samples: solved.len(),
+            manoeuvres: collected.manoeuvres.len(),
+            segments: collected.manoeuvres.iter().map(Vec::len).sum(),
+        });
+        entries.push(collected);
+    }
+    let of_kinds = samples.iter().filter(|s| kinds.contains(&s.cell.kind));
+    let header = KnnHeader {
+        vehicle: metadata.vehicle,
+        grid: metadata.grid,
+        heading_radius,
+        extent: extent(&entries),
+        kinds: headers,
+        data_sha256: content_sha256(metadata, of_kinds),
+        seed: metadata.seed,
+        crate_version: env!("CARGO_PKG_VERSION").to_owned(),
+    };
+    let bytes = knn_file::encode(&header, &entries);
+    artefact::write(out, &bytes)?;
+    let (data_sha256, seed) = (header.data_sha256, header.seed);
+    let log = KnnLog { data_sha256, seed, heading_radius, bytes: bytes.len(), kinds: logs };
+    write_beside(out, &log, card::knn(out, metadata, &log))?;
+    Ok(log)
+}
+
+/// The least power of two, from 16 m, that no coordinate exceeds.
+fn extent(entries: &[KnnEntries]) -> f64 {
+    let largest = |p: Pose| p.x.abs().max(p.y.abs());
+    let all = entries.iter().flat_map(|e| &e.samples);
+    let most = all.fold(0.0, |m: f64, e| m.max(largest(e.start)).max(largest(e.preparatory)));
+    let mut extent = 16.0;
+    while extent < most {
+        extent *= 2.0;
+    }
+    extent
+}

@@ -1,0 +1,313 @@
+//! The trained models of one run, whichever files they come from.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::method::Method;
+use crate::lab::rl::actor::Actor;
+use crate::lab::rl::courses::Course;
+use crate::lab::rl::policy_file;
+use crate::lab::rl::source::PolicySource;
+use crate::selectors::PoseSelector;
+use crate::selectors::artefact::{self, ArtefactError, Fault, Model, find_model};
+use crate::selectors::mlp::MlpSelector;
+use crate::vehicle::Vehicle;
+use crate::world::ParkingType;
+
+/// Trained models of any number of vehicles, and a policy from outside.
+#[derive(Clone, Default)]
+pub struct Models {
+    /// In the order of their first files.
+    vehicles: Vec<VehicleModels>,
+    /// For vehicles that none of them serves.
+    fleet: Option<Arc<dyn PoseSelector>>,
+    outside: Option<PolicySource>,
+}
+
+/// The models of one vehicle: at most one KNN and one MLP selector and one policy of each course.
+#[derive(Clone)]
+pub struct VehicleModels {
+    origin: Origin,
+    knn: Option<Arc<dyn PoseSelector>>,
+    mlp: Option<Arc<MlpSelector>>,
+    actors: BTreeMap<Course, Actor>,
+}
+
+/// Where a vehicle's first model comes from, and whom it was trained for.
+#[derive(Clone, Debug)]
+struct Origin {
+    path: PathBuf,
+    training: String,
+    vehicle: Vehicle,
+}
+
+/// Models that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ModelsError {
+    /// A file cannot be loaded, or was trained for another vehicle than those before it.
+    #[error("--model: {0}")]
+    Load(#[from] ArtefactError),
+    /// Two KNN files were given.
+    #[error("--model {0}: a KNN model was given before; one file holds all types: give one")]
+    TwoKnn(PathBuf),
+    /// Two models for any vehicle were given.
+    #[error("--model {0}: a model for any vehicle was given before; give one")]
+    TwoFleets(PathBuf),
+    /// Two policies of one course were given.
+    #[error("--model {path}: a policy of rl-{course} was given before; give one")]
+    TwoPolicies {
+        /// The second file.
+        path: PathBuf,
+        /// Where both learnt.
+        course: &'static str,
+    },
+    /// The scene's vehicle is not the one trained for.
+    #[error("scene {scene}: vehicle: {error}; or plan with ha-rs")]
+    Vehicle {
+        /// Name of the scene.
+        scene: String,
+        /// Which field differs, and how to train for it.
+        error: ArtefactError,
+    },
+    /// A method's model knows nothing of a parking type.
+    #[error(
+        "method {method}: no model for type {kind}: give one more with --model, or choose a \
+         --type that its models know ({known})"
+    )]
+    Kind {
+        /// The method.
+        method: Method,
+        /// The parking type it was asked to plan.
+        kind: ParkingType,
+        /// The types it knows.
+        known: String,
+    },
+}
+
+impl Models {
+    /// Loads every file of `names`; bare names are looked for in the working folder,
+    /// then in `models/`. Networks of several parking types join into one selector.
+    pub fn load<P: AsRef<Path>>(names: &[P]) -> Result<Self, ModelsError> {
+        let mut models = Self::default();
+        for name in names {
+            let path = find_model(name);
+            match Model::load(&path) {
+                Err(ArtefactError { fault: Fault::Policy, .. }) => models.add_policy(path)?,
+                model => models.add_selector(model?)?,
+            }
+        }
+        Ok(models)
+    }
+
+    fn add_selector(&mut self, model: Model) -> Result<(), ModelsError> {
+        let Some(&vehicle) = model.vehicle() else {
+            if self.fleet.is_some() {
+                return Err(ModelsError::TwoFleets(model.path().to_owned()));
+            }
+            self.fleet = Some(model.into_selector());
+            return Ok(());
+        };
+        let (path, training) = (model.path().to_owned(), model.training());
+        let own = self.of_exactly(Origin { path, training, vehicle });
+        match model {
+            Model::Fleet(_) => unreachable!("it has no vehicle"),
+            Model::Knn(knn) if own.knn.is_some() => {
+                return Err(ModelsError::TwoKnn(knn.path().to_owned()));
+            }
+            Model::Knn(knn) => own.knn = Some(Arc::new(knn)),
+            Model::Mlp(mlp) => {
+                own.mlp = Some(Arc::new(match own.mlp.take() {
+                    Some(others) => Arc::unwrap_or_clone(others).combine(mlp)?,
+                    None => mlp,
+                }));
+            }
+        }
+        Ok(())
+    }
+
+    fn add_policy(&mut self, path: PathBuf) -> Result<(), ModelsError> {
+        let (header, actor) = policy_file::load(&path)?;
+        let course = header.course;
+        let training = artefact::policy_training(course.name());
+        let own = self.of_exactly(Origin { path: path.clone(), training, vehicle: header.vehicle });
+        if own.actors.insert(course, actor).is_some() {
+            return Err(ModelsError::TwoPolicies { path, course: course.name() });
+        }
+        Ok(())
+    }
+
+    /// The models of the very vehicle of `origin`, none so far if it is new.
+    fn of_exactly(&mut self, origin: Origin) -> &mut VehicleModels {
+        let known = |m: &VehicleModels| m.origin.vehicle.is_like(&origin.vehicle);
+        let at = self.vehicles.iter().position(known).unwrap_or_else(|| {
+            let actors = BTreeMap::new();
+            self.vehicles.push(VehicleModels { origin, knn: None, mlp: None, actors });
+            self.vehicles.len() - 1
+        });
+        &mut self.vehicles[at]
+    }
+
+    /// The same with a policy from outside.
+    pub fn with_policy(self, outside: Option<PolicySource>) -> Self {
+        Self { outside, ..self }
+    }
+
+    /// The policy from outside, if any.
+    pub fn outside_policy(&self) -> Option<&PolicySource> {
+        self.outside.as_ref()
+    }
+
+    /// Loads what `methods` need from the usual files, as far as they exist: `knn.bin` and
+    /// `knn-….bin`, `mlp-TYPE.safetensors`, `rl-COURSE.safetensors`, `fleet.safetensors`. The last,
+    /// which is for any vehicle, is left out where others serve the `vehicle` that is asked for.
+    pub fn usual(methods: &[Method], vehicle: Option<&Vehicle>) -> Result<Self, ModelsError> {
+        let needs = |method: Method| methods.contains(&method);
+        let mut found = Vec::new();
+        if needs(Method::KnnN3p) || needs(Method::N3p) {
+            found.push(find_model("knn.bin"));
+        }
+        if needs(Method::MlpN3p) {
+            let network = |kind| find_model(format!("mlp-{kind}.safetensors"));
+            found.extend(ParkingType::ALL.map(network));
+        }
+        let courses = methods.iter().filter_map(|m| m.course());
+        found.extend(courses.map(|c| find_model(policy_file::usual_name(c))));
+        found.retain(|path| path.exists());
+        let mut models = Self::load(&found)?;
+        if needs(Method::KnnN3p) || needs(Method::N3p) {
+            for path in knn_of_other_vehicles() {
+                let model = Model::load(&path)?;
+                let known = |m: &VehicleModels| {
+                    m.knn.is_some() && model.vehicle().is_some_and(|v| m.vehicle().is_like(v))
+                };
+                if models.vehicles.iter().any(known) {
+                    tracing::warn!("{}: left out: its vehicle has a model", path.display());
+                } else {
+                    models.add_selector(model)?;
+                }
+            }
+        }
+        let serves = |&&m: &&Method| {
+            let own = vehicle.and_then(|v| models.serving(m, v));
+            own.and_then(|own| own.selector(m))
+                .is_some_and(|s| s.kinds().len() == ParkingType::ALL.len())
+        };
+        let any = find_model("fleet.safetensors");
+        let mut use_it = methods.iter().filter(|m| matches!(m, Method::N3p | Method::MlpN3p));
+        if any.exists() && !use_it.all(|m| serves(&m)) {
+            models.add_selector(Model::load(&any)?)?;
+        }
+        Ok(models)
+    }
+
+    /// The models that `method` plans with, vehicle by vehicle.
+    pub fn for_method(&self, method: Method) -> impl Iterator<Item = &VehicleModels> {
+        self.vehicles.iter().filter(move |m| m.serve(method))
+    }
+
+    /// The models that `method` plans with for `vehicle`: its own, or else the first that were
+    /// trained for one that covers it ([`Vehicle::covers`]).
+    pub fn serving(&self, method: Method, vehicle: &Vehicle) -> Option<&VehicleModels> {
+        if method.course().is_some() {
+            // A policy's steps are as long as its speeds say.
+            return self.for_method(method).find(|m| m.vehicle().drives_like(vehicle));
+        }
+        let own = self.for_method(method).find(|m| m.vehicle().is_like(vehicle));
+        own.or_else(|| self.for_method(method).find(|m| m.vehicle().covers(vehicle)))
+    }
+
+    /// The model that `method` plans with for vehicles that no other model serves.
+    pub fn fleet(&self, method: Method) -> Option<Arc<dyn PoseSelector>> {
+        self.fleet.clone().filter(|_| matches!(method, Method::N3p | Method::MlpN3p))
+    }
+
+    /// The selector that `method` plans with for `vehicle`; `None` where it needs none or has
+    /// none.
+    pub fn selector(&self, method: Method, vehicle: &Vehicle) -> Option<Arc<dyn PoseSelector>> {
+        match self.serving(method, vehicle) {
+            Some(models) => models.selector(method),
+            None => self.fleet(method),
+        }
+    }
+
+    /// The vehicle that the first model was trained for; `None` without models.
+    pub fn vehicle(&self) -> Option<Vehicle> {
+        self.vehicles.first().map(|m| m.origin.vehicle)
+    }
+
+    /// Refuses a scene whose vehicle no model of `method` serves.
+    pub fn check_vehicle(
+        &self,
+        method: Method,
+        scene: &str,
+        vehicle: &Vehicle,
+    ) -> Result<(), ModelsError> {
+        let Some(any) = self.for_method(method).next() else { return Ok(()) };
+        if self.serving(method, vehicle).is_some() || self.fleet(method).is_some() {
+            return Ok(());
+        }
+        let Origin { path, training, vehicle: trained } = &any.origin;
+        let check = match method.course() {
+            Some(_) => artefact::check_driving(path, training, trained, vehicle),
+            None => artefact::check_vehicle(path, training, trained, vehicle),
+        };
+        check.map_err(|error| ModelsError::Vehicle { scene: scene.to_owned(), error })
+    }
+
+    /// Refuses a parking type that `method`'s model for `vehicle` was not trained for.
+    pub fn check_kind(
+        &self,
+        method: Method,
+        vehicle: &Vehicle,
+        kind: ParkingType,
+    ) -> Result<(), ModelsError> {
+        let Some(selector) = self.selector(method, vehicle) else { return Ok(()) };
+        let kinds = selector.kinds();
+        if kinds.contains(&kind) {
+            return Ok(());
+        }
+        let known = kinds.iter().map(|k| k.name()).collect::<Vec<_>>().join(", ");
+        Err(ModelsError::Kind { method, kind, known })
+    }
+}
+
+/// Files `models/knn-….bin`, by name.
+fn knn_of_other_vehicles() -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir("models") else { return Vec::new() };
+    let mut found: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
+    found.retain(|path| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with("knn-") && name.ends_with(".bin")
+    });
+    found.sort();
+    found
+}
+
+impl VehicleModels {
+    /// The vehicle they were trained for.
+    pub fn vehicle(&self) -> &Vehicle {
+        &self.origin.vehicle
+    }
+
+    /// The selector that `method` plans with, if there is one.
+    pub fn selector(&self, method: Method) -> Option<Arc<dyn PoseSelector>> {
+        let mlp = || self.mlp.clone().map(|m| m as Arc<dyn PoseSelector>);
+        match method {
+            Method::KnnN3p => self.knn.clone(),
+            Method::MlpN3p => mlp(),
+            Method::N3p => self.knn.clone().or_else(mlp),
+            _ => None,
+        }
+    }
+
+    /// The trained policy of a course, if there is one.
+    pub fn actor(&self, course: Course) -> Option<&Actor> {
+        self.actors.get(&course)
+    }
+
+    /// Whether they hold what `method` plans with.
+    fn serve(&self, method: Method) -> bool {
+        self.selector(method).is_some() || method.course().is_some_and(|c| self.actor(c).is_some())
+    }
+}

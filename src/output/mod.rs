@@ -1,0 +1,8 @@
+//! What leaves the planner: paths and trajectories as files, and pictures.
+
+pub mod drawing;
+pub(crate) mod path_file;
+pub(crate) mod trajectory_file;
+
+pub use path_file::{PathFile, PathFileError};
+pub use trajectory_file::TrajectoryFile;

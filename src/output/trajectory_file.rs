@@ -1,0 +1,143 @@
+//! Trajectory files: a plan in time, as numbers for a controller.
+//!
+//! `.csv` holds the columns alone; `.json` holds them as arrays, and beside them the vehicle, the
+//! limits and what the trajectory asks of the car. Poses are in the scene's own frame. The format
+//! is described in `docs/formats.md`.
+
+use std::io;
+use std::path::{Path as FilePath, PathBuf};
+
+use serde::{Serialize, Serializer};
+use serde_json::Value;
+
+use super::path_file::{Near, snap};
+use crate::curves::trajectory::{LimitError, Moment, TrajectoryReport};
+use crate::curves::{Path, Trajectory, TrajectoryLimits};
+use crate::files::write_whole;
+use crate::geometry::Frame;
+use crate::vehicle::Vehicle;
+use crate::world::Scene;
+
+/// A planned trajectory, as exported.
+#[derive(Clone, Debug, Serialize)]
+pub struct TrajectoryFile {
+    /// Name of the scene.
+    pub scene: String,
+    /// The method that planned the path.
+    pub method: String,
+    /// The car, with its speeds.
+    pub vehicle: Vehicle,
+    /// The limits kept.
+    pub limits: TrajectoryLimits,
+    /// Extremes and steering jumps.
+    pub report: TrajectoryReport,
+    /// The samples, in the scene's frame.
+    #[serde(rename = "columns", serialize_with = "columns")]
+    pub moments: Vec<Moment>,
+}
+
+/// Name and value of each column, with the unit in the name.
+type Column = (&'static str, fn(&Moment) -> Value);
+
+const COLUMNS: [Column; 10] = [
+    ("time_s", |m| m.time.into()),
+    ("x_m", |m| m.pose.x.into()),
+    ("y_m", |m| m.pose.y.into()),
+    ("heading_rad", |m| m.pose.heading.into()),
+    ("speed_mps", |m| m.speed.into()),
+    ("acceleration_mps2", |m| m.acceleration.into()),
+    ("steer_rad", |m| m.steer.into()),
+    ("curvature_per_m", |m| m.curvature.into()),
+    ("distance_m", |m| m.distance.into()),
+    ("gear", |m| (m.gear.sign() as i8).into()),
+];
+
+impl TrajectoryFile {
+    /// Time between samples, seconds.
+    pub const STEP: f64 = 0.05;
+
+    /// The export of `path`, planned in `frame` for `scene` and driven within `limits`.
+    pub fn new(
+        scene: &Scene,
+        frame: &Frame,
+        path: &Path,
+        method: &str,
+        limits: TrajectoryLimits,
+    ) -> Result<Self, LimitError> {
+        let near = Near::new(scene, frame);
+        let trajectory = Trajectory::new(&path.to_world(&near.frame), &scene.vehicle, &limits)?;
+        let mut moments = trajectory.sample(Self::STEP);
+        moments.iter_mut().for_each(|m| m.pose = near.to_world(m.pose));
+        // The wheels turn at the start before the car moves: several samples are there.
+        for moment in moments.iter_mut().take_while(|m| m.distance == 0.0) {
+            moment.pose = snap(moment.pose, scene.start);
+        }
+        if let Some(last) = moments.last_mut() {
+            last.pose = snap(last.pose, scene.goal);
+        }
+        Ok(Self {
+            scene: scene.name.clone(),
+            method: method.to_owned(),
+            vehicle: scene.vehicle,
+            limits,
+            report: trajectory.report(),
+            moments,
+        })
+    }
+
+    /// A name that [`TrajectoryFile::write`] takes, from the command line.
+    pub fn file_name(text: &str) -> Result<PathBuf, String> {
+        let file = PathBuf::from(text);
+        let known = has_ending(&file, "csv") || has_ending(&file, "json");
+        known.then_some(file).ok_or_else(|| "expected a name ending in .csv or .json".to_owned())
+    }
+
+    /// Writes CSV where the name ends in `.csv`, else JSON (to a temporary name, then renamed).
+    pub fn write(&self, file: &FilePath) -> io::Result<()> {
+        let text = if has_ending(file, "csv") { self.to_csv() } else { self.to_json() };
+        write_whole(file, text.as_bytes())
+    }
+
+    fn to_csv(&self) -> String {
+        let mut lines = vec![COLUMNS.map(|(name, _)| name).join(",")];
+        let line = |m| COLUMNS.map(|(_, value)| value(m).to_string()).join(",");
+        lines.extend(self.moments.iter().map(line));
+        lines.join("\n") + "\n"
+    }
+
+    fn to_json(&self) -> String {
+        serde_json::to_string(self).expect("plain numbers and strings")
+    }
+}
+
+fn has_ending(file: &FilePath, ending: &str) -> bool {
+    file.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
+}
+
+/// The moments as one array per column.
+fn columns<S: Serializer>(moments: &[Moment], serializer: S) -> Result<S::Ok, S::Error> {
+    let arrays = COLUMNS.iter().map(|(name, value)| {
+        let array: Vec<Value> = moments.iter().map(value).collect();
+        (name, array)
+    });
+    serializer.collect_map(arrays)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::path_file::tests::far_and_mirrored;
+
+    #[test]
+    fn mirrored_plans_are_driven_in_the_scenes_frame() {
+        let (scene, frame, path) = far_and_mirrored();
+        let limits = TrajectoryLimits::default();
+        let file = TrajectoryFile::new(&scene, &frame, &path, "ha-rs", limits).unwrap();
+        let moments = &file.moments;
+        let standing: Vec<_> = moments.iter().take_while(|m| m.speed == 0.0).collect();
+        assert!(standing.len() > 10, "the wheels take their time");
+        assert!(standing.iter().all(|m| m.pose == scene.start));
+        assert_eq!(moments.last().unwrap().pose, scene.goal);
+        assert!(moments.iter().all(|m| m.steer <= 0.0), "a mirrored left turn is a right turn");
+    }
+}
