@@ -18,7 +18,7 @@ const BUDGET: Budget = Budget::new(200_000);
 
 fn bench(c: &mut Criterion) {
     let (config, vehicle) = (GeneratorConfig::default(), Vehicle::default());
-    for method in Method::ALL {
+    for method in Method::all() {
         let models = Models::usual(&[method], None).expect("the models of the repository load");
         let Ok(mut planner) = method.build(&models, &MethodSettings::default()) else {
             continue;

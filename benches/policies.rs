@@ -7,18 +7,21 @@
 
 mod common;
 
+use std::path::Path;
+
 use candle_core::Device;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use n3p::lab::rl::actor::{ActorPolicy, Choice, normal};
+use n3p::lab::rl::actor::{ActorPolicy, normal};
 use n3p::lab::rl::courses::{Course, Stratum};
 use n3p::lab::rl::encoding::InputScale;
 use n3p::lab::rl::motion::{action, admitted};
 use n3p::lab::rl::network::ACTION;
 use n3p::lab::rl::parking_env::{EnvConfig, ParkingEnv};
+use n3p::lab::rl::policy_file;
 use n3p::lab::rl::replay::Transition;
 use n3p::lab::rl::sac::{Sac, SacConfig};
 use n3p::lab::rl::{MASK, Observation, Policy};
-use n3p::n3p::{Method, Models};
+use n3p::n3p::Choice;
 use n3p::rng::{Stream, rng};
 use n3p::vehicle::Vehicle;
 use rand::RngExt;
@@ -84,10 +87,8 @@ fn bench(c: &mut Criterion) {
     let rounds = (0..100).flat_map(|_| side.round(&mut rng));
     let transitions: Vec<Transition> = rounds.collect();
     let seen: Vec<Observation> = transitions.iter().map(|t| t.before).collect();
-    let models =
-        Models::usual(&[Method::RlEval], None).expect("the policies of the repository load");
-    let of_vehicle = models.serving(Method::RlEval, &Vehicle::default());
-    let actor = of_vehicle.and_then(|m| m.actor(Course::Eval)).expect("rl-eval is shipped");
+    let file = Path::new("models/rl-eval.safetensors");
+    let (_, actor) = policy_file::load(file).expect("the policies of the repository load");
     let mut policy = ActorPolicy::new(actor.clone(), Choice::Mean);
     let mut turn = 0;
     c.bench_function("action", |b| {

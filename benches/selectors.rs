@@ -21,7 +21,7 @@ fn bench(c: &mut Criterion) {
             Models::usual(&[method], Some(&vehicle)).expect("the models of the repository load");
         models.selector(method, &vehicle).expect("models/ holds a model for the method")
     };
-    let (knn, mlp) = (selector(Method::KnnN3p), selector(Method::MlpN3p));
+    let (knn, mlp) = (selector(Method::KNN_N3P), selector(Method::MLP_N3P));
     let mut group = c.benchmark_group("selectors");
     for (name, selector, k) in [("knn_1", &knn, 1), ("knn_8", &knn, 8), ("mlp", &mlp, 1)] {
         let features = common::features(&problems, selector.grid());

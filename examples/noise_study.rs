@@ -37,7 +37,7 @@ const SPACING: f64 = 0.05;
 const NOISE: [f64; 5] = [0.0, 0.01, 0.02, 0.03, 0.05];
 /// Margins asked for, metres.
 const MARGINS: [f64; 5] = [Problem::MARGIN, 0.02, 0.05, 0.10, 0.15];
-const METHODS: [Method; 2] = [Method::N3p, Method::HaRs];
+const METHODS: [Method; 2] = [Method::N3P, Method::HA_RS];
 const BUDGET: Budget = Budget::new(50_000);
 
 fn main() -> anyhow::Result<()> {

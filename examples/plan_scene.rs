@@ -6,7 +6,7 @@ use std::path::Path;
 
 use n3p::n3p::guided::{GuidedPlanner, RankedConfig};
 use n3p::planners::{Budget, HybridAStarConfig, Planner, Problem};
-use n3p::selectors::artefact::Model;
+use n3p::selectors::model::Model;
 use n3p::world::Scene;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -9,7 +9,7 @@ use std::ops::RangeInclusive;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::LevelFilter;
 
 use crate::files::reason;
 use crate::planners::Problem;
@@ -86,11 +86,11 @@ pub fn margin(text: &str) -> Result<f64, String> {
 
 /// Runs a binary's body and maps its error to stderr and an exit code.
 pub fn run(body: impl FnOnce() -> anyhow::Result<ExitCode>) -> ExitCode {
-    let filter = EnvFilter::try_from_env("N3P_LOG").unwrap_or_else(|_| EnvFilter::new("info"));
+    let level = std::env::var("N3P_LOG").ok().and_then(|level| level.parse().ok());
     tracing_subscriber::fmt()
-        .with_env_filter(filter)
+        .with_max_level(level.unwrap_or(LevelFilter::INFO))
         .with_writer(std::io::stderr)
-        .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
+        .with_ansi(false)
         .with_target(false)
         .without_time()
         .init();
@@ -100,6 +100,35 @@ pub fn run(body: impl FnOnce() -> anyhow::Result<ExitCode>) -> ExitCode {
             eprintln!("error: {error:#}");
             ExitCode::from(if error.downcast_ref::<BadInput>().is_some() { 2 } else { 1 })
         }
+    }
+}
+
+/// A driving policy from outside.
+#[cfg(feature = "lab")]
+#[derive(clap::Args)]
+pub struct PolicyArgs {
+    /// A driving policy from outside, the method "policy": an .onnx file, or the command of a
+    /// program (see docs/policies.md).
+    #[arg(long, value_name = "FILE|COMMAND")]
+    policy: Option<String>,
+    /// Seconds that the program of --policy may take for an answer.
+    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, requires = "policy", value_parser = seconds, allow_negative_numbers = true)]
+    policy_limit: f64,
+}
+
+#[cfg(feature = "lab")]
+impl PolicyArgs {
+    /// Whether there is one.
+    pub fn is_given(&self) -> bool {
+        self.policy.is_some()
+    }
+
+    /// The policy, opened once to see that it can be.
+    pub fn driver(&self) -> anyhow::Result<Option<std::sync::Arc<dyn crate::n3p::Driver>>> {
+        use crate::lab::rl::source::PolicySource;
+        let Some(policy) = &self.policy else { return Ok(None) };
+        let source = PolicySource::new(policy, self.policy_limit).or_bad_input()?;
+        Ok(Some(std::sync::Arc::new(source)))
     }
 }
 

@@ -4,8 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use serde::de::DeserializeOwned;
-use sha2::{Digest, Sha256};
+use hmac_sha256::Hash;
 
 /// Ends the names of unfinished files; a killed run may leave some.
 pub const TEMPORARY: &str = ".tmp";
@@ -17,8 +16,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     if is_special(path) {
         return File::options().write(true).open(path)?.write_all(bytes);
     }
-    let name = path.file_name().ok_or(ErrorKind::InvalidInput)?.to_string_lossy();
-    let temporary = path.with_file_name(format!("{name}.{}{TEMPORARY}", std::process::id()));
+    let temporary = temporary(path)?;
     let attempt = || {
         let mut file = File::create(&temporary)?;
         file.write_all(bytes)?;
@@ -39,6 +37,12 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     sync_folder(folder_of(path))
 }
 
+/// Where the bytes of `path` wait until they are whole.
+fn temporary(path: &Path) -> io::Result<PathBuf> {
+    let name = path.file_name().ok_or(ErrorKind::InvalidInput)?.to_string_lossy();
+    Ok(path.with_file_name(format!("{name}.{}{TEMPORARY}", std::process::id())))
+}
+
 /// Checks that a file could be written at `path`, making its folder.
 pub fn check_writable(path: &Path) -> io::Result<()> {
     if path.is_dir() {
@@ -48,7 +52,9 @@ pub fn check_writable(path: &Path) -> io::Result<()> {
         return Ok(());
     }
     fs::create_dir_all(folder_of(path))?;
-    tempfile::NamedTempFile::new_in(folder_of(path)).map(drop).map_err(|e| e.kind().into())
+    let temporary = temporary(path)?;
+    File::create(&temporary).map_err(|e| io::Error::from(e.kind()))?;
+    remove_if_present(&temporary)
 }
 
 /// Removes the unfinished files that killed runs left in `folder`.
@@ -111,54 +117,13 @@ pub fn reason(error: &io::Error) -> String {
     }
 }
 
-/// A file of settings that cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum TomlError {
-    /// The file cannot be read.
-    #[error("{path}: cannot be read: {}; expected a TOML file", reason(error))]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        error: io::Error,
-    },
-    /// The file is no TOML, or has an unknown or ill-typed key.
-    #[error("{path}: line {line} (`{text}`): {message}")]
-    Parse {
-        /// The file.
-        path: PathBuf,
-        /// Line number, from 1.
-        line: usize,
-        /// What stands there.
-        text: String,
-        /// What is wrong with it.
-        message: String,
-    },
-}
-
-/// Reads a TOML file; what it says is not checked.
-pub fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, TomlError> {
-    let text = fs::read_to_string(path)
-        .map_err(|error| TomlError::Read { path: path.to_owned(), error })?;
-    toml::from_str(&text).map_err(|e| {
-        let start = e.span().map_or(0, |span| span.start.min(text.len()));
-        let line = text.as_bytes()[..start].iter().filter(|b| **b == b'\n').count();
-        TomlError::Parse {
-            path: path.to_owned(),
-            line: line + 1,
-            text: text.lines().nth(line).unwrap_or_default().trim().to_owned(),
-            message: e.message().replace('\n', " "),
-        }
-    })
-}
-
 /// SHA-256 over the concatenation of `parts`.
 pub fn sha256(parts: &[&[u8]]) -> [u8; 32] {
-    let mut hasher = Sha256::new();
+    let mut hasher = Hash::new();
     for part in parts {
         hasher.update(part);
     }
-    hasher.finalize().into()
+    hasher.finalize()
 }
 
 /// SHA-256 in lower-case hexadecimal.

@@ -27,21 +27,24 @@
 
 #![warn(missing_docs)]
 
+#[cfg(feature = "plan")]
 pub mod cli;
 pub mod curves;
 pub mod episode;
 pub mod files;
 pub mod geometry;
+#[cfg(feature = "lab")]
 pub mod lab;
 pub mod n3p;
 pub mod output;
 pub mod planners;
+#[cfg(any(test, feature = "generate"))]
 pub mod rng;
 pub mod selectors;
 pub mod vehicle;
 pub mod world;
 
 /// The programs in the README compile and run.
-#[cfg(doctest)]
+#[cfg(all(doctest, feature = "lab"))]
 #[doc = include_str!("../README.md")]
 struct Readme;

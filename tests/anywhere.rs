@@ -101,13 +101,13 @@ fn generated(count: u64, hinted: bool) -> Vec<Scene> {
 #[test]
 fn generated_scenes_are_planned_the_same_anywhere() {
     let models = Models::load(&["models/knn.bin"]).unwrap();
-    check(&generated(6, true), &[Method::N3p, Method::HaRs], &models);
+    check(&generated(6, true), &[Method::N3P, Method::HA_RS], &models);
 }
 
 #[test]
 fn scenes_without_a_parking_type_are_understood_the_same_anywhere() {
     let models = Models::load(&["models/knn.bin"]).unwrap();
-    check(&generated(3, false), &[Method::N3p], &models);
+    check(&generated(3, false), &[Method::N3P], &models);
 }
 
 /// Scenes of a published benchmark lie a million kilometres from the origin. There neighbouring
@@ -115,7 +115,7 @@ fn scenes_without_a_parking_type_are_understood_the_same_anywhere() {
 #[test]
 fn far_away_paths_are_as_long_and_pass_the_independent_check() {
     let models = Models::load(&["models/knn.bin"]).unwrap();
-    for method in [Method::N3p, Method::HaRs, Method::Ha] {
+    for method in [Method::N3P, Method::HA_RS, Method::HA] {
         let mut planner = method.build(&models, &MethodSettings::default()).unwrap();
         for (i, scene) in generated(1, true).into_iter().enumerate() {
             let mut here = None;
@@ -146,8 +146,8 @@ fn far_away_paths_are_as_long_and_pass_the_independent_check() {
 }
 
 fn check_lots(scenes: &[Scene]) {
-    let models = Models::usual(&[Method::N3p], None).unwrap();
-    check(scenes, &[Method::N3p], &models);
+    let models = Models::usual(&[Method::N3P], None).unwrap();
+    check(scenes, &[Method::N3P], &models);
 }
 
 #[test]

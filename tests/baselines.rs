@@ -42,7 +42,7 @@ fn plan_all(method: Method) -> Vec<PlanResult> {
                 oracle::check(scene, &file).unwrap_or_else(|e| panic!("{what}: {e}"));
             }
             Err(reason) => {
-                let no_parallel = method == Method::Sha && *kind != ParkingType::Parallel;
+                let no_parallel = method == Method::SHA && *kind != ParkingType::Parallel;
                 assert_eq!(*reason == NoPath::NotApplicable, no_parallel, "{what}: {reason}");
                 assert!(no_parallel || *reason == NoPath::BudgetSpent, "{what}: {reason}");
             }
@@ -58,7 +58,7 @@ fn nodes(results: &[PlanResult]) -> usize {
 
 #[test]
 fn without_curves_the_search_still_arrives_exactly() {
-    let results = plan_all(Method::Ha);
+    let results = plan_all(Method::HA);
     let solved = results.iter().filter(|r| r.outcome.is_ok()).count();
     assert!(solved * 100 >= results.len() * 95, "{solved} of {}", results.len());
     assert!(results.iter().all(|r| r.expansions > 0), "there is no curve to end it at once");
@@ -66,7 +66,7 @@ fn without_curves_the_search_still_arrives_exactly() {
 
 #[test]
 fn more_heuristics_mean_fewer_nodes() {
-    let (one, many) = (plan_all(Method::HaRs), plan_all(Method::Mhha));
+    let (one, many) = (plan_all(Method::HA_RS), plan_all(Method::MHHA));
     assert!(many.iter().all(|r| r.outcome.is_ok()));
     assert!(nodes(&many) < nodes(&one), "{} {}", nodes(&many), nodes(&one));
 }
@@ -77,7 +77,7 @@ fn the_exit_manoeuvre_saves_most_of_the_search() {
     let of_parallel = |method| -> Vec<PlanResult> {
         plan_all(method).into_iter().zip(&parallel).filter(|(_, p)| **p).map(|(r, _)| r).collect()
     };
-    let (plain, scenario) = (of_parallel(Method::HaRs), of_parallel(Method::Sha));
+    let (plain, scenario) = (of_parallel(Method::HA_RS), of_parallel(Method::SHA));
     assert!(scenario.iter().all(|r| r.outcome.is_ok()));
     assert!(nodes(&scenario) * 2 < nodes(&plain), "{} {}", nodes(&scenario), nodes(&plain));
 }
@@ -106,7 +106,7 @@ fn holding_on_never_costs_more() {
 fn a_spent_budget_is_the_reason() {
     let (_, scene) = scenes().pop().unwrap();
     let problem = Problem::new(&scene).unwrap();
-    let mut planner = Method::Ha.build(&Models::default(), &MethodSettings::default()).unwrap();
+    let mut planner = Method::HA.build(&Models::default(), &MethodSettings::default()).unwrap();
     let result = planner.plan(&problem, Budget::new(10));
     assert_eq!((result.outcome, result.expansions), (Err(NoPath::BudgetSpent), 10));
 }
@@ -117,7 +117,7 @@ fn a_spent_budget_is_the_reason() {
 fn effort_only_ever_pays() {
     let config = HybridAStarConfig::default();
     let models = Models::load(&["models/knn.bin".to_owned()]).unwrap();
-    for method in [Method::HaRs, Method::Mhha, Method::N3p] {
+    for method in [Method::HA_RS, Method::MHHA, Method::N3P] {
         let mut planner = method.build(&models, &MethodSettings::default()).unwrap();
         for (kind, scene) in scenes().iter().step_by(3) {
             let problem = Problem::new(scene).unwrap();

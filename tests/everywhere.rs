@@ -65,7 +65,7 @@ fn scaled(scene: &Scene, factor: f64) -> Scene {
 
 #[test]
 fn a_scene_of_any_size_is_planned_the_same() {
-    for (method, models) in [(Method::HaRs, &[][..]), (Method::N3p, &["models/fleet.safetensors"])]
+    for (method, models) in [(Method::HA_RS, &[][..]), (Method::N3P, &["models/fleet.safetensors"])]
     {
         let mut planner = planner(method, models);
         for scene in scenes(2) {
@@ -74,7 +74,7 @@ fn a_scene_of_any_size_is_planned_the_same() {
             let usual_cost = cost_of(&usual, &scene.vehicle);
             // By powers of two a search does exactly the same; by others rounding decides between equals, and
             // what a search finds first may be a little better or worse.
-            let exact = if method == Method::HaRs { 1e-4 } else { 0.1 };
+            let exact = if method == Method::HA_RS { 1e-4 } else { 0.1 };
             let factors = [(0.125, exact), (2.0, exact), (0.1, 0.3), (0.37, 0.3), (5.0, 0.3)];
             for (factor, most) in factors {
                 let other = scaled(&scene, factor);
@@ -88,7 +88,7 @@ fn a_scene_of_any_size_is_planned_the_same() {
 
 #[test]
 fn replanning_on_the_way_goes_on_and_does_not_begin_anew() {
-    let mut planner = planner(Method::N3p, &["models/knn.bin"]);
+    let mut planner = planner(Method::N3P, &["models/knn.bin"]);
     let (mut poses, mut dearer) = (0, 0);
     for scene in scenes(4) {
         let path = plan(planner.as_mut(), &scene);
@@ -146,7 +146,7 @@ fn rest_of(path: &Path, samples: &[n3p::curves::Sample], i: usize) -> Path {
 
 #[test]
 fn no_motion_is_shorter_than_a_centimetre_unless_start_and_goal_are_that_near() {
-    for (method, models) in [(Method::HaRs, &[][..]), (Method::N3p, &["models/knn.bin"])] {
+    for (method, models) in [(Method::HA_RS, &[][..]), (Method::N3P, &["models/knn.bin"])] {
         let mut planner = planner(method, models);
         for scene in scenes(6) {
             let path = plan(planner.as_mut(), &scene);
@@ -159,7 +159,7 @@ fn no_motion_is_shorter_than_a_centimetre_unless_start_and_goal_are_that_near() 
 
 #[test]
 fn the_order_of_obstacles_does_not_matter() {
-    let mut planner = planner(Method::N3p, &["models/knn.bin"]);
+    let mut planner = planner(Method::N3P, &["models/knn.bin"]);
     for scene in scenes(3) {
         let mut other = scene.clone();
         other.obstacles.reverse();
@@ -170,7 +170,7 @@ fn the_order_of_obstacles_does_not_matter() {
 
 #[test]
 fn who_is_there_stays_and_who_stands_before_it_drives_straight() {
-    let mut planner = planner(Method::N3p, &["models/knn.bin"]);
+    let mut planner = planner(Method::N3P, &["models/knn.bin"]);
     for scene in scenes(2) {
         let there = Scene { start: scene.goal, ..scene.clone() };
         let path = plan(planner.as_mut(), &there);
@@ -221,14 +221,14 @@ fn narrow_doors_and_long_ways_round_are_found() {
             wall(-6.1, 4.0, 6.1, 4.1),
         ];
         let through = scene(robot, Pose::new(-3.0, -2.0, 0.0), Pose::new(2.0, 2.5, 0.0), door);
-        let path = plan(planner(Method::HaRs, &[]).as_mut(), &through);
+        let path = plan(planner(Method::HA_RS, &[]).as_mut(), &through);
         assert!(path.length() < 10.0, "{shift}: {}", path.length());
     }
     // A wall of 50 m between two aisles.
     let car = Vehicle::default();
     let row = vec![wall(-30.0, 4.0, 20.0, 9.0), wall(-40.0, -4.0, 60.0, -3.8)];
     let round = scene(car, Pose::new(0.0, 0.0, 0.0), Pose::new(0.0, 12.0, 3.0), row);
-    for method in [Method::HaRs, Method::Mhha] {
+    for method in [Method::HA_RS, Method::MHHA] {
         let path = plan(planner(method, &[]).as_mut(), &round);
         assert!(path.length() < 75.0, "{method}: {}", path.length());
     }

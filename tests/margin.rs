@@ -56,7 +56,7 @@ fn plan(text: &str, args: &[&str]) -> assert_cmd::assert::Assert {
 fn plans_keep_the_margin_in_the_eyes_of_the_oracle() {
     const ASKED: f64 = 0.2;
     let models = models();
-    for method in [Method::HaRs, Method::N3p] {
+    for method in [Method::HA_RS, Method::N3P] {
         let mut planner = method.build(&models, &MethodSettings::default()).unwrap();
         let (mut found, mut whole) = (0, 0);
         for i in 0..30 {
@@ -64,7 +64,7 @@ fn plans_keep_the_margin_in_the_eyes_of_the_oracle() {
             let case = Case { scene: scene(kind, Level::Easy, i), kind: Some(kind), level: None };
             let usual = EpisodeConfig::new(BUDGET);
             let config = EpisodeConfig { margin_m: ASKED, repeats: 0, ..usual };
-            let episode = episode::run(&case, planner.as_mut(), &config).unwrap();
+            let episode = episode::run(&case, planner.as_mut(), &config, &oracle::JUDGE).unwrap();
             let margin = episode.problem.margin;
             whole += usize::from(margin == ASKED);
             if let Some(clearance) = episode.row.min_clearance_m {
@@ -109,7 +109,7 @@ proptest! {
 #[test]
 fn results_do_not_depend_on_margins_planned_before() {
     let models = models();
-    for method in [Method::HaRs, Method::N3p, Method::KnnN3p] {
+    for method in [Method::HA_RS, Method::N3P, Method::KNN_N3P] {
         let build = || method.build(&models, &MethodSettings::default()).unwrap();
         let mut used = build();
         for i in 0..12 {
@@ -131,7 +131,7 @@ fn no_margin_is_the_usual_one() {
     let cases = suite::generated(&Vehicle::default(), &kinds, &Level::ALL, 3, 11).unwrap();
     let rows = |margin_m| {
         let config = SuiteConfig {
-            methods: vec![Method::HaRs, Method::N3p],
+            methods: vec![Method::HA_RS, Method::N3P],
             settings: MethodSettings::default(),
             budget: BUDGET,
             margin_m,

@@ -9,7 +9,7 @@ use n3p::n3p::{Method, MethodSettings, Models};
 use n3p::output::PathFile;
 use n3p::planners::{Budget, HybridAStarConfig, Problem, Route};
 use n3p::selectors::Features;
-use n3p::selectors::artefact::Model;
+use n3p::selectors::model::Model;
 use n3p::vehicle::{Gear, Vehicle};
 use n3p::world::abstraction::abstractions;
 use n3p::world::cell::{Cell, Grid};
@@ -89,7 +89,7 @@ fn no_method_fails_on_900_scenes() {
         900_900,
     )
     .unwrap();
-    let methods = [Method::HaRs, Method::KnnN3p, Method::N3p];
+    let methods = [Method::HA_RS, Method::KNN_N3P, Method::N3P];
     let mut planners = methods.map(|m| m.build(&models, &MethodSettings::default()).unwrap());
     for case in &scenes {
         let problem = Problem::new(&case.scene).unwrap();
@@ -114,7 +114,7 @@ fn settings_decide_what_is_tried_before_a_search() {
     let scenes = suite::generated(&vehicle, &kind, &[Level::Extreme], 40, 4242).unwrap();
     let plans = |n3p: RankedConfig| {
         let settings = MethodSettings { n3p, ..MethodSettings::default() };
-        let mut planner = Method::N3p.build(&models, &settings).unwrap();
+        let mut planner = Method::N3P.build(&models, &settings).unwrap();
         let (mut library, mut searched) = (0, 0);
         for case in &scenes {
             let problem = Problem::new(&case.scene).unwrap();
@@ -141,9 +141,9 @@ fn settings_decide_what_is_tried_before_a_search() {
 /// the cheaper way. Some scene of the folder is of that kind, and in none the plan costs much more
 /// than that of `ha-rs`.
 fn check_curves_to_the_goal(folder: &str) {
-    let models = Models::usual(&[Method::N3p], None).unwrap();
+    let models = Models::usual(&[Method::N3P], None).unwrap();
     let [mut n3p, mut hars] =
-        [Method::N3p, Method::HaRs].map(|m| m.build(&models, &MethodSettings::default()).unwrap());
+        [Method::N3P, Method::HA_RS].map(|m| m.build(&models, &MethodSettings::default()).unwrap());
     let mut direct = 0;
     for scene in Scene::read_dir(folder.as_ref()).unwrap() {
         let problem = Problem::new(&scene).unwrap();

@@ -5,8 +5,9 @@ use n3p::episode::{Case, EpisodeConfig};
 use n3p::lab::evaluation::oracle;
 use n3p::lab::rl::courses::{Course, Stratum};
 use n3p::lab::rl::motion::{action, admitted};
-use n3p::lab::rl::rollout::{PolicyPlanner, RolloutConfig};
+use n3p::lab::rl::rollout::PolicyPlanner;
 use n3p::lab::rl::{Action, MASK, Observation, Policy, PolicyFault};
+use n3p::n3p::RolloutConfig;
 use n3p::output::PathFile;
 use n3p::planners::{Budget, HybridAStarConfig, NoPath, PARKED_COVER, Planner, Problem};
 use n3p::vehicle::Vehicle;
@@ -54,7 +55,7 @@ fn even_a_random_walk_parks_and_passes_the_independent_check() {
         for index in 0..20 {
             let case = Case { scene: scene(kind, index), kind: Some(kind), level: None };
             let config = EpisodeConfig::new(BUDGET);
-            let row = episode::run(&case, &mut planner, &config).unwrap().row;
+            let row = episode::run(&case, &mut planner, &config, &oracle::JUDGE).unwrap().row;
             assert_eq!(row.method, "policy");
             assert!(row.nodes <= 400);
             if row.ok {

@@ -65,8 +65,8 @@ proptest! {
     fn a_model_serves_vehicles_that_its_own_covers(vehicle in covered()) {
         prop_assert!(vehicle.validate().is_ok() && Vehicle::default().covers(&vehicle));
         let models = Models::load(&["models/knn.bin"]).unwrap();
-        prop_assert!(models.check_vehicle(Method::N3p, "a", &vehicle).is_ok());
-        plan_all(&models, Method::N3p, &vehicle, 2);
+        prop_assert!(models.check_vehicle(Method::N3P, "a", &vehicle).is_ok());
+        plan_all(&models, Method::N3P, &vehicle, 2);
     }
 
     #[test]
@@ -91,7 +91,7 @@ fn larger_wider_or_clumsier_vehicles_are_refused_with_the_way_to_train() {
         Vehicle { wheelbase: accord.wheelbase + 0.1, ..accord },
     ] {
         assert!(!accord.covers(&other) && !accord.is_like(&other));
-        let error = models.check_vehicle(Method::N3p, "lot", &other).unwrap_err().to_string();
+        let error = models.check_vehicle(Method::N3P, "lot", &other).unwrap_err().to_string();
         for part in
             ["scene lot", "knn.bin", "trained for another vehicle", "n3p-collect", "n3p-train knn"]
         {
@@ -107,10 +107,10 @@ fn one_model_plans_for_vehicles_it_never_saw() {
         let file = format!("experiments/vehicles/{name}.toml");
         let vehicle = Vehicle::read(Path::new(&file)).unwrap();
         // Known manoeuvres serve, but for those that are looked at once more.
-        let [searched, full] = plan_all(&models, Method::N3p, &vehicle, 4);
+        let [searched, full] = plan_all(&models, Method::N3P, &vehicle, 4);
         assert!(searched <= 24 && full <= 4, "{name}: {searched} of 36 searched, {full} in full");
         // Without the network every plan would be a full one.
-        let [searched, full] = plan_all(&models, Method::MlpN3p, &vehicle, 4);
+        let [searched, full] = plan_all(&models, Method::MLP_N3P, &vehicle, 4);
         assert!(searched <= 22 && full <= 3, "{name}: {searched} of 36 searched, {full} in full");
     }
 }
@@ -119,13 +119,13 @@ fn one_model_plans_for_vehicles_it_never_saw() {
 fn models_of_several_vehicles_go_together() {
     let models = Models::load(&["models/knn.bin", "models/knn-tpcap.bin"]).unwrap();
     let tpcap = Vehicle::read("experiments/vehicles/tpcap.toml".as_ref()).unwrap();
-    let of = |vehicle: &Vehicle| *models.serving(Method::KnnN3p, vehicle).unwrap().vehicle();
+    let of = |vehicle: &Vehicle| *models.serving(Method::KNN_N3P, vehicle).unwrap().vehicle();
     assert!(of(&Vehicle::default()).is_like(&Vehicle::default()));
     assert!(of(&tpcap).is_like(&tpcap));
     // The cases of Dragon Lake are 2 mm narrower.
     assert!(of(&Vehicle { width: 1.94, ..tpcap }).is_like(&tpcap));
-    plan_all(&models, Method::N3p, &tpcap, 2);
-    plan_all(&models, Method::N3p, &Vehicle::default(), 2);
+    plan_all(&models, Method::N3P, &tpcap, 2);
+    plan_all(&models, Method::N3P, &Vehicle::default(), 2);
 }
 
 fn run(program: &str, folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {

@@ -6,13 +6,13 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::Parser;
-use n3p::cli::{self, BadInput, OrBadInput};
+use n3p::cli::{self, BadInput, OrBadInput, PolicyArgs};
 use n3p::episode::Case;
 use n3p::lab::evaluation::report::{self, Provenance};
 use n3p::lab::evaluation::suite::{self, SuiteConfig, SuiteError};
 use n3p::lab::evaluation::{Outputs, metrics, quality};
 use n3p::lab::progress;
-use n3p::lab::rl::source::PolicySource;
+use n3p::lab::rl::methods::POLICY;
 use n3p::lab::training;
 use n3p::n3p::{Method, MethodSettings, Models};
 use n3p::planners::{Budget, Effort};
@@ -28,13 +28,8 @@ struct Args {
     /// knn.bin, from the same places].
     #[arg(long = "model", value_name = "FILE")]
     models: Vec<String>,
-    /// A driving policy from outside, the method "policy": an .onnx file, or the command of a
-    /// program (see docs/policies.md).
-    #[arg(long, value_name = "FILE|COMMAND")]
-    policy: Option<String>,
-    /// Seconds that the program of --policy may take for an answer.
-    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, requires = "policy", value_parser = cli::seconds, allow_negative_numbers = true)]
-    policy_limit: f64,
+    #[command(flatten)]
+    policy: PolicyArgs,
     /// Parking type [default: all that the models know].
     #[arg(long = "type", value_enum, value_name = "TYPE")]
     kind: Option<ParkingType>,
@@ -89,7 +84,7 @@ fn main() -> ExitCode {
 }
 
 fn evaluate(args: &Args) -> Result<ExitCode> {
-    let policy = args.policy.as_deref().map(|p| PolicySource::new(p, args.policy_limit));
+    let policy = args.policy.driver()?;
     let vehicle = match &args.vehicle {
         Some(path) => Some(Vehicle::read(path).or_bad_input()?),
         None => None,
@@ -100,7 +95,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
         [] => Models::usual(&args.methods, Some(&vehicle.unwrap_or_default())),
         given => Models::load(given),
     };
-    let models = models.or_bad_input()?.with_policy(policy.transpose().or_bad_input()?);
+    let models = models.or_bad_input()?.with_policy(policy);
     let config = SuiteConfig {
         methods: match &args.methods[..] {
             [] => Method::available(&models),
@@ -111,7 +106,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
         margin_m: args.margin,
         threads: args.threads.into(),
     };
-    if args.policy.is_some() && !config.methods.contains(&Method::Policy) {
+    if args.policy.is_given() && !config.methods.contains(&POLICY) {
         let text = "--policy: --methods does not name policy; add it there, or leave --policy out";
         return Err(BadInput(text.to_owned()).into());
     }

@@ -3,20 +3,21 @@
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use anyhow::Result;
 use clap::Parser;
+#[cfg(feature = "lab")]
+use n3p::cli::PolicyArgs;
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::curves::TrajectoryLimits;
 use n3p::curves::trajectory::TrajectoryReport;
 use n3p::episode;
-use n3p::episode::{Case, Episode, EpisodeConfig, SpotReport};
+use n3p::episode::{Case, Episode, EpisodeConfig, Judge, SpotReport};
 use n3p::output::drawing::{Drawing, scene_svg};
 
 use n3p::files::{check_writable, reason, write_whole};
-use n3p::lab::rl::source::PolicySource;
-use n3p::lab::training;
-use n3p::n3p::{Method, MethodSettings, Models};
+use n3p::n3p::{Driver, Method, MethodSettings, Models, catalogue};
 use n3p::output::TrajectoryFile;
 use n3p::planners::{Budget, Effort, Problem};
 use n3p::world::Scene;
@@ -28,8 +29,11 @@ use n3p::world::Scene;
 #[command(version)]
 struct Args {
     /// The scene, .json or TPCAP .csv.
-    #[arg(long, value_name = "FILE")]
-    scene: PathBuf,
+    #[arg(long, value_name = "FILE", required_unless_present = "list_models")]
+    scene: Option<PathBuf>,
+    /// List the models there are, for which vehicles, and from where; then stop.
+    #[arg(long = "models")]
+    list_models: bool,
     /// The method [default: n3p where a model fits the scene, else ha-rs].
     #[arg(long, value_name = "NAME")]
     method: Option<Method>,
@@ -37,13 +41,9 @@ struct Args {
     /// mlp-TYPE.safetensors or rl-ENV.safetensors, in the working folder or in models/].
     #[arg(long = "model", value_name = "FILE")]
     models: Vec<String>,
-    /// A driving policy from outside, the method "policy": an .onnx file, or the command of a
-    /// program (see docs/policies.md).
-    #[arg(long, value_name = "FILE|COMMAND")]
-    policy: Option<String>,
-    /// Seconds that the program of --policy may take for an answer.
-    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, requires = "policy", value_parser = cli::seconds, allow_negative_numbers = true)]
-    policy_limit: f64,
+    #[cfg(feature = "lab")]
+    #[command(flatten)]
+    policy: PolicyArgs,
     /// Keep so many metres from obstacles, 0 to 1; less along the whole path where start or goal
     /// is nearer to one. Never less than 5 mm where they allow it.
     #[arg(long, default_value_t = 0.0, value_name = "METRES", value_parser = cli::margin, allow_hyphen_values = true)]
@@ -111,15 +111,28 @@ impl Limits {
     }
 }
 
+/// Who looks at the path before anybody drives it.
+#[cfg(feature = "lab")]
+const JUDGE: Judge = n3p::lab::evaluation::oracle::JUDGE;
+#[cfg(not(feature = "lab"))]
+const JUDGE: Judge = episode::CERTIFICATE;
+
 fn main() -> ExitCode {
     // SAFETY: the first statement of the program, which has started no thread.
-    unsafe { training::single_threaded() };
+    #[cfg(feature = "lab")]
+    unsafe {
+        n3p::lab::training::single_threaded();
+    };
     cli::run(|| plan(&cli::parse()))
 }
 
 fn plan(args: &Args) -> Result<ExitCode> {
-    let scene = Scene::read(&args.scene).or_bad_input()?;
-    let file = args.scene.display();
+    if args.list_models {
+        return list_models(args.json);
+    }
+    let file = args.scene.as_deref().expect("clap asks for it");
+    let scene = Scene::read(file).or_bad_input()?;
+    let file = file.display();
     let problem = Problem::with_margin(&scene, args.margin)
         .map_err(|e| BadInput(format!("{file}: {e}; move it to where the car fits")))?;
     let unwritable = |path: &Path, e: io::Error| {
@@ -145,7 +158,7 @@ fn plan(args: &Args) -> Result<ExitCode> {
     let budget = Budget { max_expansions: args.max_expansions, effort: args.effort };
     let usual = EpisodeConfig::new(budget);
     let once = EpisodeConfig { repeats: 0, margin_m: args.margin, ..usual };
-    let episode = episode::run(&case, planner.as_mut(), &once)?;
+    let episode = episode::run(&case, planner.as_mut(), &once, &JUDGE)?;
 
     if let (Some(out), Some(path)) = (&args.out, &episode.path) {
         path.write(out).or_bad_input()?;
@@ -196,16 +209,38 @@ fn plan(args: &Args) -> Result<ExitCode> {
     }
 }
 
+/// What models there are, a line each; one that cannot be used is told, and the exit code says so.
+fn list_models(json: bool) -> Result<ExitCode> {
+    let (mut listings, mut faults) = (Vec::new(), Vec::new());
+    for entry in catalogue() {
+        match entry {
+            Ok(listing) => listings.push(listing),
+            Err(fault) => faults.push(fault.to_string()),
+        }
+    }
+    if json {
+        cli::print(serde_json::json!({ "models": listings, "unusable": faults }))?;
+    } else {
+        let lines: Vec<String> =
+            listings.iter().map(|l| l.to_string().trim_end().to_owned()).collect();
+        cli::print(if lines.is_empty() { "no models".to_owned() } else { lines.join("\n") })?;
+    }
+    match &faults[..] {
+        [] => Ok(ExitCode::SUCCESS),
+        faults => Err(BadInput(faults.join("; ")).into()),
+    }
+}
+
 /// The method and its models: as told, or the best that fits the scene.
 fn choose(args: &Args, scene: &Scene, problem: &Problem) -> Result<(Method, Models)> {
-    let policy = args.policy.as_deref().map(|p| PolicySource::new(p, args.policy_limit));
-    let policy = policy.transpose().or_bad_input()?;
-    let other = if policy.is_some() { Method::Policy } else { Method::N3p };
+    let policy = outside_policy(args)?;
+    let other = policy.as_ref().map_or(Method::N3P, |(method, _)| *method);
     let method = args.method.unwrap_or(other);
-    if policy.is_some() && method != Method::Policy {
+    if policy.is_some() && method != other {
         let text = format!("--policy: --method is {method}, not policy; leave one of them out");
         return Err(BadInput(text).into());
     }
+    let policy = policy.map(|(_, driver)| driver);
     let models = match &args.models[..] {
         [] => Models::usual(&[method], Some(&scene.vehicle)),
         given => Models::load(given),
@@ -223,9 +258,21 @@ fn choose(args: &Args, scene: &Scene, problem: &Problem) -> Result<(Method, Mode
         (Err(reason), true) => Err(reason),
         (Err(reason), false) => {
             tracing::info!("planning with ha-rs: {reason:#}");
-            Ok((Method::HaRs, models))
+            Ok((Method::HA_RS, models))
         }
     }
+}
+
+/// The policy of --policy, and its method.
+#[cfg(feature = "lab")]
+fn outside_policy(args: &Args) -> Result<Option<(Method, Arc<dyn Driver>)>> {
+    Ok(args.policy.driver()?.map(|driver| (n3p::lab::rl::methods::POLICY, driver)))
+}
+
+/// The planner alone drives with no policy.
+#[cfg(not(feature = "lab"))]
+fn outside_policy(_: &Args) -> Result<Option<(Method, Arc<dyn Driver>)>> {
+    Ok(None)
 }
 
 fn summary(episode: &Episode) -> String {

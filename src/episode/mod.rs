@@ -1,5 +1,6 @@
 //! One episode: one method on one scene, timed, checked and told.
 
+mod clearance;
 mod row;
 mod spot_report;
 
@@ -8,7 +9,6 @@ pub use spot_report::{SpotReport, abstraction, regions};
 
 use std::time::Instant;
 
-use crate::lab::evaluation::oracle;
 use crate::output::PathFile;
 use crate::planners::{Budget, PARKED_COVER, PlanResult, Planner, Problem, ProblemError};
 use crate::world::{Level, ParkingType, Scene};
@@ -45,6 +45,20 @@ impl EpisodeConfig {
     }
 }
 
+/// Who looks at a path after its planner.
+pub struct Judge {
+    /// What it says of a path that it accepts: [`Row::checked`].
+    pub verdict: &'static str,
+    /// The smallest distance to an obstacle, metres, or why it refuses the path. The third argument
+    /// is the share of the parked footprint that must be covered, where a path need not end exactly at
+    /// the goal.
+    pub check: fn(&Scene, &PathFile, Option<f64>) -> Result<f64, String>,
+}
+
+/// Nobody: the path has passed the exact swept check of [`PlanResult::certified`], and is measured.
+pub const CERTIFICATE: Judge =
+    Judge { verdict: "certified", check: |scene, path, _| Ok(clearance::of(scene, path)) };
+
 /// What an episode leaves.
 #[derive(Clone, Debug)]
 pub struct Episode {
@@ -72,6 +86,7 @@ pub fn run(
     case: &Case,
     planner: &mut dyn Planner,
     config: &EpisodeConfig,
+    judge: &Judge,
 ) -> Result<Episode, ProblemError> {
     let (problem, result, first_s) = timed(&case.scene, planner, config)?;
     let mut times = Vec::new();
@@ -88,7 +103,7 @@ pub fn run(
     }
     times.sort_by(f64::total_cmp);
     let mut row = blank_row(case, planner.name(), times[times.len() / 2]);
-    let path = describe(case, &problem, &result, &mut row);
+    let path = describe(case, &problem, &result, judge, &mut row);
     if !repeatable {
         row.ok = false;
         row.reason = UNREPEATABLE.to_owned();
@@ -135,6 +150,7 @@ fn describe(
     case: &Case,
     problem: &Problem,
     result: &PlanResult,
+    judge: &Judge,
     row: &mut Row,
 ) -> Option<PathFile> {
     row.nodes = result.expansions as u32;
@@ -155,19 +171,15 @@ fn describe(
     row.max_abs_steer_rad = Some(vehicle.steer(path.max_abs_curvature()));
     row.mean_abs_steer_change_rad = Some(path.mean_abs_steer_change(vehicle));
     let file = PathFile::new(&case.scene, &problem.frame, path, &row.method);
-    let checked = match result.covered {
-        None => oracle::check(&case.scene, &file),
-        Some(_) => oracle::check_cover(&case.scene, &file, PARKED_COVER),
-    };
-    match checked {
+    match (judge.check)(&case.scene, &file, result.covered.map(|_| PARKED_COVER)) {
         Ok(clearance) => {
             row.ok = true;
             row.min_clearance_m = Some(clearance).filter(|c| c.is_finite());
-            row.checked = "ok".to_owned();
+            row.checked = judge.verdict.to_owned();
         }
         Err(violation) => {
             row.reason = REJECTED.to_owned();
-            row.checked = violation.to_string();
+            row.checked = violation;
         }
     }
     Some(file)

@@ -136,38 +136,6 @@ impl Row {
     pub fn to_csv(&self) -> String {
         self.fields().map(|f| quoted(&f)).join(",") + "\n"
     }
-
-    pub(crate) fn from_fields(f: &[String]) -> Result<Row, String> {
-        if f.len() != Self::COLUMNS.len() {
-            return Err(format!("has {} columns; expected {}", f.len(), Self::COLUMNS.len()));
-        }
-        fn parse<T: std::str::FromStr>(f: &[String], i: usize) -> Result<T, String> {
-            f[i].parse().map_err(|_| format!("{} is \"{}\"", Row::COLUMNS[i], f[i]))
-        }
-        fn maybe<T: std::str::FromStr>(f: &[String], i: usize) -> Result<Option<T>, String> {
-            if f[i].is_empty() { Ok(None) } else { parse(f, i).map(Some) }
-        }
-        Ok(Row {
-            scene: f[0].clone(),
-            kind: maybe(f, 1)?,
-            level: maybe(f, 2)?,
-            method: f[3].clone(),
-            ok: parse(f, 4)?,
-            reason: f[5].clone(),
-            plan_time_s: parse(f, 6)?,
-            length_m: maybe(f, 7)?,
-            direction_changes: maybe(f, 8)?,
-            max_abs_steer_rad: maybe(f, 9)?,
-            mean_abs_steer_change_rad: maybe(f, 10)?,
-            nodes: parse(f, 11)?,
-            min_clearance_m: maybe(f, 12)?,
-            fallback: parse(f, 13)?,
-            checked: f[14].clone(),
-            route: f[15].clone(),
-            cost_over_best: maybe(f, 16)?,
-            changes_over_fewest: maybe(f, 17)?,
-        })
-    }
 }
 
 fn quoted(field: &str) -> String {

@@ -2,7 +2,7 @@
 //!
 //! In reading order; each uses those above it and the planner, never one below.
 //!
-//! - [`progress`]: progress bars
+//! - [`progress`]: progress bars; [`toml_file`]: files of settings
 //! - [`nn`]: pieces of neural networks
 //! - [`rl`]: policies of reinforcement learning, and the environment they park in
 //! - [`dataset`]: collecting samples into Parquet, and reading them back
@@ -16,4 +16,5 @@ pub mod experiments;
 pub mod nn;
 pub mod progress;
 pub mod rl;
+pub mod toml_file;
 pub mod training;

@@ -4,10 +4,15 @@
 //! name; it is built from [`Models`], which know the vehicles they serve.
 
 mod by_vehicle;
+mod catalogue;
+mod driver;
 pub mod guided;
-mod method;
+pub mod method;
 mod models;
+mod more;
 
+pub use catalogue::{Listing, catalogue};
+pub use driver::{Choice, Driver, RolloutConfig, TrainedPolicy};
 pub use guided::GuidedPlanner;
 pub use method::{Method, MethodError, MethodSettings};
 pub use models::{Models, ModelsError};

@@ -1,17 +1,16 @@
 //! The trained models of one run, whichever files they come from.
 
-use std::collections::BTreeMap;
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::method::Method;
-use crate::lab::rl::actor::Actor;
-use crate::lab::rl::courses::Course;
-use crate::lab::rl::policy_file;
-use crate::lab::rl::source::PolicySource;
-use crate::selectors::PoseSelector;
-use crate::selectors::artefact::{self, ArtefactError, Fault, Model, find_model};
+use super::method::{Learnt, Method};
+use super::{Driver, TrainedPolicy, more};
+use crate::selectors::artefact::{self, ArtefactError, Fault, find_model};
 use crate::selectors::mlp::MlpSelector;
+use crate::selectors::model::Model;
+use crate::selectors::{PoseSelector, shipped};
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
 
@@ -22,7 +21,7 @@ pub struct Models {
     vehicles: Vec<VehicleModels>,
     /// For vehicles that none of them serves.
     fleet: Option<Arc<dyn PoseSelector>>,
-    outside: Option<PolicySource>,
+    outside: Option<Arc<dyn Driver>>,
 }
 
 /// The models of one vehicle: at most one KNN and one MLP selector and one policy of each course.
@@ -31,7 +30,7 @@ pub struct VehicleModels {
     origin: Origin,
     knn: Option<Arc<dyn PoseSelector>>,
     mlp: Option<Arc<MlpSelector>>,
-    actors: BTreeMap<Course, Actor>,
+    drivers: BTreeMap<&'static str, Arc<dyn Driver>>,
 }
 
 /// Where a vehicle's first model comes from, and whom it was trained for.
@@ -127,12 +126,11 @@ impl Models {
     }
 
     fn add_policy(&mut self, path: PathBuf) -> Result<(), ModelsError> {
-        let (header, actor) = policy_file::load(&path)?;
-        let course = header.course;
-        let training = artefact::policy_training(course.name());
-        let own = self.of_exactly(Origin { path: path.clone(), training, vehicle: header.vehicle });
-        if own.actors.insert(course, actor).is_some() {
-            return Err(ModelsError::TwoPolicies { path, course: course.name() });
+        let TrainedPolicy { course, vehicle, driver } = more::read_policy(&path)?;
+        let training = artefact::policy_training(course);
+        let own = self.of_exactly(Origin { path: path.clone(), training, vehicle });
+        if own.drivers.insert(course, driver).is_some() {
+            return Err(ModelsError::TwoPolicies { path, course });
         }
         Ok(())
     }
@@ -141,20 +139,20 @@ impl Models {
     fn of_exactly(&mut self, origin: Origin) -> &mut VehicleModels {
         let known = |m: &VehicleModels| m.origin.vehicle.is_like(&origin.vehicle);
         let at = self.vehicles.iter().position(known).unwrap_or_else(|| {
-            let actors = BTreeMap::new();
-            self.vehicles.push(VehicleModels { origin, knn: None, mlp: None, actors });
+            let drivers = BTreeMap::new();
+            self.vehicles.push(VehicleModels { origin, knn: None, mlp: None, drivers });
             self.vehicles.len() - 1
         });
         &mut self.vehicles[at]
     }
 
     /// The same with a policy from outside.
-    pub fn with_policy(self, outside: Option<PolicySource>) -> Self {
+    pub fn with_policy(self, outside: Option<Arc<dyn Driver>>) -> Self {
         Self { outside, ..self }
     }
 
     /// The policy from outside, if any.
-    pub fn outside_policy(&self) -> Option<&PolicySource> {
+    pub fn outside_policy(&self) -> Option<&Arc<dyn Driver>> {
         self.outside.as_ref()
     }
 
@@ -162,20 +160,20 @@ impl Models {
     /// `knn-….bin`, `mlp-TYPE.safetensors`, `rl-COURSE.safetensors`, `fleet.safetensors`. The last,
     /// which is for any vehicle, is left out where others serve the `vehicle` that is asked for.
     pub fn usual(methods: &[Method], vehicle: Option<&Vehicle>) -> Result<Self, ModelsError> {
-        let needs = |method: Method| methods.contains(&method);
+        let knn = methods.iter().any(|m| matches!(m.learnt(), Some(Learnt::Knn | Learnt::Either)));
         let mut found = Vec::new();
-        if needs(Method::KnnN3p) || needs(Method::N3p) {
+        if knn {
             found.push(find_model("knn.bin"));
         }
-        if needs(Method::MlpN3p) {
+        if methods.iter().any(|m| m.learnt() == Some(Learnt::Mlp)) {
             let network = |kind| find_model(format!("mlp-{kind}.safetensors"));
             found.extend(ParkingType::ALL.map(network));
         }
         let courses = methods.iter().filter_map(|m| m.course());
-        found.extend(courses.map(|c| find_model(policy_file::usual_name(c))));
-        found.retain(|path| path.exists());
+        found.extend(courses.map(|course| find_model(format!("rl-{course}.safetensors"))));
+        found.retain(|path| artefact::exists(path));
         let mut models = Self::load(&found)?;
-        if needs(Method::KnnN3p) || needs(Method::N3p) {
+        if knn {
             for path in knn_of_other_vehicles() {
                 let model = Model::load(&path)?;
                 let known = |m: &VehicleModels| {
@@ -194,9 +192,26 @@ impl Models {
                 .is_some_and(|s| s.kinds().len() == ParkingType::ALL.len())
         };
         let any = find_model("fleet.safetensors");
-        let mut use_it = methods.iter().filter(|m| matches!(m, Method::N3p | Method::MlpN3p));
-        if any.exists() && !use_it.all(|m| serves(&m)) {
+        let mut use_it = methods.iter().filter(|m| uses_networks(**m));
+        if artefact::exists(&any) && !use_it.all(|m| serves(&m)) {
             models.add_selector(Model::load(&any)?)?;
+        }
+        Ok(models)
+    }
+
+    /// The models compiled in that serve `vehicle`, for `n3p`: those of a vehicle that covers it, or
+    /// else the one for any. None without the feature `models`.
+    pub fn compiled_in(vehicle: &Vehicle) -> Result<Self, ModelsError> {
+        let mut models = Self::default();
+        let is_knn = |name: &str| name.starts_with("knn") && name.ends_with(".bin");
+        let of = |wanted: fn(&str) -> bool| shipped::FILES.iter().filter(move |(n, _)| wanted(n));
+        for (name, bytes) in of(is_knn) {
+            models.add_selector(Model::from_bytes(Path::new(name), Cow::Borrowed(bytes))?)?;
+        }
+        if models.serving(Method::N3P, vehicle).is_none() {
+            for (name, bytes) in of(|name| name == "fleet.safetensors") {
+                models.add_selector(Model::from_bytes(Path::new(name), Cow::Borrowed(bytes))?)?;
+            }
         }
         Ok(models)
     }
@@ -219,7 +234,7 @@ impl Models {
 
     /// The model that `method` plans with for vehicles that no other model serves.
     pub fn fleet(&self, method: Method) -> Option<Arc<dyn PoseSelector>> {
-        self.fleet.clone().filter(|_| matches!(method, Method::N3p | Method::MlpN3p))
+        self.fleet.clone().filter(|_| uses_networks(method))
     }
 
     /// The selector that `method` plans with for `vehicle`; `None` where it needs none or has
@@ -272,16 +287,24 @@ impl Models {
     }
 }
 
-/// Files `models/knn-….bin`, by name.
+/// Whether a method may plan with networks.
+fn uses_networks(method: Method) -> bool {
+    matches!(method.learnt(), Some(Learnt::Mlp | Learnt::Either))
+}
+
+/// Files `models/knn-….bin`, and those compiled in, by name.
 fn knn_of_other_vehicles() -> Vec<PathBuf> {
-    let Ok(entries) = std::fs::read_dir("models") else { return Vec::new() };
-    let mut found: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
-    found.retain(|path| {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        name.starts_with("knn-") && name.ends_with(".bin")
-    });
-    found.sort();
-    found
+    named(|name| name.starts_with("knn-") && name.ends_with(".bin"))
+}
+
+/// Models in `models/` and those compiled in whose names pass, by name; files come before what is
+/// compiled in.
+pub(super) fn named(passes: impl Fn(&str) -> bool) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir("models").into_iter().flatten();
+    let in_folder = entries.filter_map(|e| Some(e.ok()?.file_name().into_string().ok()?));
+    let compiled_in = shipped::FILES.iter().map(|(name, _)| (*name).to_owned());
+    let names: BTreeSet<String> = in_folder.chain(compiled_in).filter(|n| passes(n)).collect();
+    names.into_iter().map(find_model).collect()
 }
 
 impl VehicleModels {
@@ -293,21 +316,20 @@ impl VehicleModels {
     /// The selector that `method` plans with, if there is one.
     pub fn selector(&self, method: Method) -> Option<Arc<dyn PoseSelector>> {
         let mlp = || self.mlp.clone().map(|m| m as Arc<dyn PoseSelector>);
-        match method {
-            Method::KnnN3p => self.knn.clone(),
-            Method::MlpN3p => mlp(),
-            Method::N3p => self.knn.clone().or_else(mlp),
-            _ => None,
+        match method.learnt()? {
+            Learnt::Knn => self.knn.clone(),
+            Learnt::Mlp => mlp(),
+            Learnt::Either => self.knn.clone().or_else(mlp),
         }
     }
 
     /// The trained policy of a course, if there is one.
-    pub fn actor(&self, course: Course) -> Option<&Actor> {
-        self.actors.get(&course)
+    pub fn driver(&self, course: &str) -> Option<&Arc<dyn Driver>> {
+        self.drivers.get(course)
     }
 
     /// Whether they hold what `method` plans with.
     fn serve(&self, method: Method) -> bool {
-        self.selector(method).is_some() || method.course().is_some_and(|c| self.actor(c).is_some())
+        self.selector(method).is_some() || method.course().is_some_and(|c| self.driver(c).is_some())
     }
 }

@@ -5,4 +5,4 @@ pub(crate) mod path_file;
 pub(crate) mod trajectory_file;
 
 pub use path_file::{PathFile, PathFileError};
-pub use trajectory_file::TrajectoryFile;
+pub use trajectory_file::{Driven, TrajectoryFile};

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::curves::Path;
 use crate::files::{reason, write_whole};
 use crate::geometry::{Frame, Pose, Vec2, signed_angle};
+use crate::vehicle::Vehicle;
 use crate::world::Scene;
 
 /// A planned path, as exported.
@@ -57,19 +58,30 @@ impl PathFile {
 
     /// The export of `path`, planned in `frame` for `scene`.
     pub fn new(scene: &Scene, frame: &Frame, path: &Path, method: &str) -> Self {
-        let near = Near::new(scene, frame);
+        Self::between([scene.start, scene.goal], &scene.vehicle, frame, path, method)
+    }
+
+    /// The export of `path`, planned in `frame`, from a start to a goal in the world.
+    pub fn between(
+        [start, goal]: [Pose; 2],
+        vehicle: &Vehicle,
+        frame: &Frame,
+        path: &Path,
+        method: &str,
+    ) -> Self {
+        let near = Near::new(start, frame);
         let mut samples = path.to_world(&near.frame).sample(Self::STEP);
         samples.iter_mut().for_each(|s| s.pose = near.to_world(s.pose));
         if let Some(first) = samples.first_mut() {
-            first.pose = snap(first.pose, scene.start);
+            first.pose = snap(first.pose, start);
         }
         if let Some(last) = samples.last_mut() {
-            last.pose = snap(last.pose, scene.goal);
+            last.pose = snap(last.pose, goal);
         }
         Self {
             poses: samples.iter().map(|s| s.pose.into()).collect(),
             gears: samples.iter().map(|s| s.gear.sign() as i8).collect(),
-            steer: samples.iter().map(|s| scene.vehicle.steer(s.curvature)).collect(),
+            steer: samples.iter().map(|s| vehicle.steer(s.curvature)).collect(),
             method: method.to_owned(),
         }
     }
@@ -123,8 +135,8 @@ impl Near {
     /// Farther than this from the origin is far, metres: up to here coordinates resolve 2 nm.
     const FAR: f64 = 1e7;
 
-    pub fn new(scene: &Scene, frame: &Frame) -> Self {
-        let start = scene.start.position();
+    pub fn new(start: Pose, frame: &Frame) -> Self {
+        let start = start.position();
         let origin = if start.amax() > Self::FAR { start } else { Vec2::zeros() };
         let Frame { origin_in_world: o, mirrored } = *frame;
         let origin_in_world = Pose::new(o.x - origin.x, o.y - origin.y, o.heading);
@@ -140,7 +152,6 @@ impl Near {
 pub(super) mod tests {
     use super::*;
     use crate::curves::Segment;
-    use crate::vehicle::Vehicle;
 
     /// A plan forward to the left and back, in a mirrored frame far from the origin, and its scene.
     pub fn far_and_mirrored() -> (Scene, Frame, Path) {

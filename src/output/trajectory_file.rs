@@ -14,7 +14,7 @@ use super::path_file::{Near, snap};
 use crate::curves::trajectory::{LimitError, Moment, TrajectoryReport};
 use crate::curves::{Path, Trajectory, TrajectoryLimits};
 use crate::files::write_whole;
-use crate::geometry::Frame;
+use crate::geometry::{Frame, Pose};
 use crate::vehicle::Vehicle;
 use crate::world::Scene;
 
@@ -36,6 +36,42 @@ pub struct TrajectoryFile {
     pub moments: Vec<Moment>,
 }
 
+/// A path in time, in the world's frame.
+#[derive(Clone, Debug)]
+pub struct Driven {
+    /// Extremes and steering jumps.
+    pub report: TrajectoryReport,
+    /// Samples [`Driven::STEP`] apart, and the end.
+    pub moments: Vec<Moment>,
+}
+
+impl Driven {
+    /// Time between samples, seconds.
+    pub const STEP: f64 = 0.05;
+
+    /// `path`, planned in `frame` from a start to a goal in the world, driven within `limits`.
+    pub fn new(
+        [start, goal]: [Pose; 2],
+        vehicle: &Vehicle,
+        frame: &Frame,
+        path: &Path,
+        limits: &TrajectoryLimits,
+    ) -> Result<Self, LimitError> {
+        let near = Near::new(start, frame);
+        let trajectory = Trajectory::new(&path.to_world(&near.frame), vehicle, limits)?;
+        let mut moments = trajectory.sample(Self::STEP);
+        moments.iter_mut().for_each(|m| m.pose = near.to_world(m.pose));
+        // The wheels turn at the start before the car moves: several samples are there.
+        for moment in moments.iter_mut().take_while(|m| m.distance == 0.0) {
+            moment.pose = snap(moment.pose, start);
+        }
+        if let Some(last) = moments.last_mut() {
+            last.pose = snap(last.pose, goal);
+        }
+        Ok(Self { report: trajectory.report(), moments })
+    }
+}
+
 /// Name and value of each column, with the unit in the name.
 type Column = (&'static str, fn(&Moment) -> Value);
 
@@ -53,9 +89,6 @@ const COLUMNS: [Column; 10] = [
 ];
 
 impl TrajectoryFile {
-    /// Time between samples, seconds.
-    pub const STEP: f64 = 0.05;
-
     /// The export of `path`, planned in `frame` for `scene` and driven within `limits`.
     pub fn new(
         scene: &Scene,
@@ -64,25 +97,10 @@ impl TrajectoryFile {
         method: &str,
         limits: TrajectoryLimits,
     ) -> Result<Self, LimitError> {
-        let near = Near::new(scene, frame);
-        let trajectory = Trajectory::new(&path.to_world(&near.frame), &scene.vehicle, &limits)?;
-        let mut moments = trajectory.sample(Self::STEP);
-        moments.iter_mut().for_each(|m| m.pose = near.to_world(m.pose));
-        // The wheels turn at the start before the car moves: several samples are there.
-        for moment in moments.iter_mut().take_while(|m| m.distance == 0.0) {
-            moment.pose = snap(moment.pose, scene.start);
-        }
-        if let Some(last) = moments.last_mut() {
-            last.pose = snap(last.pose, scene.goal);
-        }
-        Ok(Self {
-            scene: scene.name.clone(),
-            method: method.to_owned(),
-            vehicle: scene.vehicle,
-            limits,
-            report: trajectory.report(),
-            moments,
-        })
+        let ends = [scene.start, scene.goal];
+        let Driven { report, moments } = Driven::new(ends, &scene.vehicle, frame, path, &limits)?;
+        let (scene, vehicle) = (scene.name.clone(), scene.vehicle);
+        Ok(Self { scene, method: method.to_owned(), vehicle, limits, report, moments })
     }
 
     /// A name that [`TrajectoryFile::write`] takes, from the command line.

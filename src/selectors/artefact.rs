@@ -1,22 +1,16 @@
-//! Model files: finding, recognising, checking, writing.
+//! What every model file needs: finding, errors, checks, writing.
 //!
-//! They are told apart by content: `knn.bin` (see [`super::knn_file`]), one safetensors file per
-//! network (see [`super::mlp`]), and one for any vehicle (see [`super::fleet`]). Nothing is used before magic,
-//! version, checksum, shapes and vehicle are checked; every [`ArtefactError`] names the
-//! file, what is wrong with it and what would mend it. Files are written aside, synced
-//! and renamed, so that a reader never sees half a model.
+//! Nothing is used before magic, version, checksum, shapes and vehicle are checked; every
+//! [`ArtefactError`] names the file, what is wrong with it and what would mend it. Files are written
+//! aside, synced and renamed, so that a reader never sees half a model. Where there is no file of a
+//! bare name, one that is compiled in serves ([`shipped`]).
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-use super::PoseSelector;
-use super::fleet::FleetSelector;
-use super::knn::KnnSelector;
-use super::knn_file;
-use super::mlp::MlpSelector;
-use super::tensor_file::Content;
+use super::shipped;
 use crate::files::{self, reason, write_whole};
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
@@ -57,6 +51,11 @@ pub enum Fault {
     /// A policy, where a selector of preparatory poses is wanted.
     #[error("it holds a driving policy, no selector; give it with --policy")]
     Policy,
+    /// A policy, in a build of the planner alone.
+    #[error(
+        "it holds a driving policy, and this program was built without them; build it with --features lab"
+    )]
+    NoPolicies,
     /// A selector of preparatory poses, where a policy is wanted.
     #[error("it holds a selector of preparatory poses, no policy; give it with --model")]
     Selector,
@@ -125,102 +124,6 @@ impl Fault {
     }
 }
 
-/// A loaded and checked model.
-#[derive(Debug)]
-pub enum Model {
-    /// `knn.bin`.
-    Knn(KnnSelector),
-    /// A network of one parking type.
-    Mlp(MlpSelector),
-    /// Manoeuvres and networks for any vehicle.
-    Fleet(Box<FleetSelector>),
-}
-
-impl Model {
-    /// Loads a model of either kind.
-    pub fn load(path: &Path) -> Result<Model, ArtefactError> {
-        let mut start = [0u8; 8];
-        let mut file = open(path)?;
-        let mut read = 0;
-        while read < start.len() {
-            match file.read(&mut start[read..]).map_err(|e| Fault::Unreadable(e).of(path))? {
-                0 if read == 0 => return Err(Fault::Empty.of(path)),
-                0 => return Err(Fault::NotAModel.of(path)),
-                n => read += n,
-            }
-        }
-        if start == knn_file::MAGIC {
-            return Ok(Model::Knn(KnnSelector::load(path)?));
-        }
-        // A safetensors file begins with the length of its header and a brace.
-        let mut brace = [0u8; 1];
-        match file.read_exact(&mut brace) {
-            Ok(()) if brace == *b"{" => {
-                let bytes = std::fs::read(path).map_err(|e| Fault::Unreadable(e).of(path))?;
-                match Content::of_file(&bytes) {
-                    Content::Fleet => {
-                        Ok(Model::Fleet(Box::new(FleetSelector::from_bytes(path, &bytes)?)))
-                    }
-                    Content::Mlp | Content::Policy => Ok(Model::Mlp(MlpSelector::load(path)?)),
-                }
-            }
-            _ => Err(Fault::NotAModel.of(path)),
-        }
-    }
-
-    /// The vehicle the model was trained for; `None` where it is for any.
-    pub fn vehicle(&self) -> Option<&Vehicle> {
-        match self {
-            Model::Knn(m) => Some(m.vehicle()),
-            Model::Mlp(m) => Some(m.vehicle()),
-            Model::Fleet(_) => None,
-        }
-    }
-
-    /// The file it was loaded from.
-    pub fn path(&self) -> &Path {
-        match self {
-            Model::Knn(m) => m.path(),
-            Model::Mlp(m) => m.path(),
-            Model::Fleet(m) => m.path(),
-        }
-    }
-
-    /// The parking types it was trained for.
-    pub fn kinds(&self) -> Vec<ParkingType> {
-        match self {
-            Model::Knn(m) => m.kinds(),
-            Model::Mlp(m) => m.kinds(),
-            Model::Fleet(m) => m.kinds(),
-        }
-    }
-
-    /// How to train another one.
-    pub fn training(&self) -> String {
-        let name = match self {
-            Model::Knn(_) => "knn",
-            Model::Mlp(_) => "mlp",
-            Model::Fleet(_) => "fleet",
-        };
-        selector_training(name, &self.kinds())
-    }
-
-    /// Refuses a model that was trained for another car; see [`check_vehicle`].
-    pub fn check_vehicle(&self, wanted: &Vehicle) -> Result<(), ArtefactError> {
-        let Some(vehicle) = self.vehicle() else { return Ok(()) };
-        check_vehicle(self.path(), &self.training(), vehicle, wanted)
-    }
-
-    /// The model as a selector that threads can share.
-    pub fn into_selector(self) -> Arc<dyn PoseSelector> {
-        match self {
-            Model::Knn(m) => Arc::new(m),
-            Model::Mlp(m) => Arc::new(m),
-            Model::Fleet(m) => Arc::new(*m),
-        }
-    }
-}
-
 /// Compares what decides where a car can drive: dimensions and steering limit. Speeds only enter
 /// times, so a selector serves every speed.
 ///
@@ -275,7 +178,8 @@ pub fn policy_training(course: &str) -> String {
 }
 
 /// Where the model called `name` lies: a path is taken as it is; a bare name is looked
-/// for in the working folder, then in `models/`.
+/// for in the working folder, then in `models/`; where it is in neither, the name remains, and may be
+/// that of a model compiled in.
 pub fn find_model(name: impl AsRef<Path>) -> PathBuf {
     let name = name.as_ref();
     let in_models = Path::new("models").join(name);
@@ -298,14 +202,25 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), ArtefactError> {
         .map_err(|e| Fault::Unwritable(e).of(path))
 }
 
-/// The bytes of a model file.
-pub(crate) fn read(path: &Path) -> Result<Vec<u8>, ArtefactError> {
-    let mut file = open(path)?;
+/// Whether there is such a model, as a file or compiled in.
+pub fn exists(path: &Path) -> bool {
+    path.exists() || shipped::find(path).is_some()
+}
+
+/// The bytes of a model.
+pub(crate) fn read(path: &Path) -> Result<Cow<'static, [u8]>, ArtefactError> {
+    let mut file = match open(path) {
+        Ok(file) => file,
+        Err(error) => match (&error.fault, shipped::find(path)) {
+            (Fault::Missing, Some(bytes)) => return Ok(Cow::Borrowed(bytes)),
+            _ => return Err(error),
+        },
+    };
     // Of the right size at once, where it is known.
     let size = file.metadata().map_or(0, |m| m.len());
     let mut bytes = Vec::with_capacity(usize::try_from(size).unwrap_or(0));
     file.read_to_end(&mut bytes).map_err(|e| Fault::Unreadable(e).of(path))?;
-    Ok(bytes)
+    Ok(Cow::Owned(bytes))
 }
 
 /// Opens a model file, refusing missing ones.

@@ -186,12 +186,6 @@ pub(crate) fn in_metres(pose: Pose, vehicle: &Vehicle) -> Pose {
     Pose { x: pose.x * unit, y: pose.y * unit, ..pose }
 }
 
-/// A pose in turning radii of `vehicle`.
-pub(crate) fn in_radii(pose: Pose, vehicle: &Vehicle) -> Pose {
-    let unit = vehicle.turning_radius();
-    Pose { x: pose.x / unit, y: pose.y / unit, ..pose }
-}
-
 /// A manoeuvre `factor` times as large.
 pub(crate) fn scaled(manoeuvre: &[Segment], factor: f64) -> Vec<Segment> {
     let scale =

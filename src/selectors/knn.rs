@@ -10,13 +10,14 @@
 //!
 //! Sources: paper, section IV (KNN-N3P). Read next: [`super::knn_file`].
 
+use std::borrow::Cow;
 use std::num::NonZero;
 use std::path::Path;
 use std::sync::OnceLock;
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 
-use super::artefact::ArtefactError;
+use super::artefact::{self, ArtefactError};
 use super::knn_file::KnnFile;
 use super::{Features, PoseSelector};
 use crate::curves::Segment;
@@ -68,7 +69,12 @@ impl KnnSelector {
 
     /// Maps and checks a `knn.bin`.
     pub fn load(path: &Path) -> Result<Self, ArtefactError> {
-        let file = KnnFile::open(path)?;
+        Self::from_bytes(path, artefact::read(path)?)
+    }
+
+    /// Checks the content of the file at `path`.
+    pub fn from_bytes(path: &Path, bytes: Cow<'static, [u8]>) -> Result<Self, ArtefactError> {
+        let file = KnnFile::new(path, bytes)?;
         let kinds = &file.header().kinds;
         let cells = kinds.iter().map(|k| (0..k.cells).map(|_| OnceLock::new()).collect()).collect();
         Ok(Self { file, cells })

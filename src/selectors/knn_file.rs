@@ -24,13 +24,14 @@
 //! connection away. Manoeuvres are driven back from the goal, so they always end there. A
 //! sample takes 15 bytes.
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::artefact::{self, ArtefactError, Fault};
+use super::artefact::{ArtefactError, Fault};
 use crate::curves::Segment;
 use crate::files::sha256;
 use crate::geometry::{Pose, wrap_angle};
@@ -154,7 +155,7 @@ pub fn encode(header: &KnnHeader, entries: &[KnnEntries]) -> Vec<u8> {
 /// A checked `knn.bin`, in memory.
 #[derive(Debug)]
 pub struct KnnFile {
-    bytes: Vec<u8>,
+    bytes: Cow<'static, [u8]>,
     path: PathBuf,
     header: Box<KnnHeader>,
     sections: Vec<Section>,
@@ -171,10 +172,9 @@ struct Section {
 }
 
 impl KnnFile {
-    /// Reads and checks a file. The checksum reads every byte anyway, and what is in memory stays
-    /// as it was checked, whatever becomes of the file.
-    pub fn open(path: &Path) -> Result<Self, ArtefactError> {
-        let bytes = artefact::read(path)?;
+    /// Checks the content of the file at `path`. The checksum reads every byte anyway, and what is in
+    /// memory stays as it was checked, whatever becomes of the file.
+    pub fn new(path: &Path, bytes: Cow<'static, [u8]>) -> Result<Self, ArtefactError> {
         let (header, sections) = check(&bytes).map_err(|fault| fault.of(path))?;
         Ok(Self { bytes, path: path.to_owned(), header: Box::new(header), sections })
     }

@@ -79,8 +79,12 @@ pub struct MlpSelector {
 impl MlpSelector {
     /// Reads and checks one network.
     pub fn load(path: &Path) -> Result<Self, ArtefactError> {
-        let bytes = artefact::read(path)?;
-        let (header, weights) = decode(&bytes).map_err(|fault| fault.of(path))?;
+        Self::from_bytes(path, &artefact::read(path)?)
+    }
+
+    /// Checks the content of the file at `path`.
+    pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, ArtefactError> {
+        let (header, weights) = decode(bytes).map_err(|fault| fault.of(path))?;
         let network = Network::new(Features::COUNT, &weights);
         Ok(Self { networks: vec![Trained { path: path.to_owned(), header, network }] })
     }

@@ -11,8 +11,10 @@ pub mod fleet;
 pub mod knn;
 pub mod knn_file;
 pub mod mlp;
+pub mod model;
 pub mod network;
 mod normaliser;
+pub mod shipped;
 pub mod tensor_file;
 
 pub use features::{Features, UNIT_COUNT, UNIT_NAMES};

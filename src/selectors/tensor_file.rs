@@ -3,8 +3,6 @@
 //! One metadata entry `n3p` holds a JSON object `{"sha256": …, "header": …}`. The header is an
 //! object with a `format_version`; the checksum covers the header's text and all tensor bytes.
 
-use std::collections::HashMap;
-
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensorError, SafeTensors};
 use serde::Deserialize;
@@ -46,7 +44,8 @@ pub fn encode(header: &str, mut tensors: Vec<NamedTensor>) -> Vec<u8> {
     let sum = sha256_hex(&parts);
     // One entry only: safetensors writes several in random order.
     let entry = format!("{{\"sha256\":\"{sum}\",\"header\":{header}}}");
-    let metadata = HashMap::from([(METADATA_KEY.to_owned(), entry)]);
+    // Collected into the map that safetensors takes, with its feature std or without.
+    let metadata = [(METADATA_KEY.to_owned(), entry)].into_iter().collect();
     let views = tensors.iter().map(|t| {
         let view = TensorView::new(t.dtype, t.shape.clone(), &t.bytes);
         (&t.name, view.expect("as many bytes as the shape says"))

@@ -5,11 +5,8 @@
 
 mod overlap;
 
-use std::path::{Path, PathBuf};
-
 use serde::{Deserialize, Serialize};
 
-use crate::files::{TomlError, read_toml};
 use crate::geometry::{Aabb, Polygon, Pose};
 
 /// Direction of motion.
@@ -93,31 +90,7 @@ pub struct VehicleError {
     pub expected: &'static str,
 }
 
-/// A vehicle file that cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum VehicleFileError {
-    /// It cannot be read, or is no TOML of a vehicle.
-    #[error(transparent)]
-    File(#[from] TomlError),
-    /// A field is out of range.
-    #[error("{}: {error}", .path.display())]
-    Invalid {
-        /// The file.
-        path: PathBuf,
-        /// The field.
-        error: VehicleError,
-    },
-}
-
 impl Vehicle {
-    /// Reads and checks a TOML file with the fields of a vehicle.
-    pub fn read(path: &Path) -> Result<Self, VehicleFileError> {
-        let vehicle: Self = read_toml(path)?;
-        let invalid = |error| VehicleFileError::Invalid { path: path.to_owned(), error };
-        vehicle.validate().map_err(invalid)?;
-        Ok(vehicle)
-    }
-
     /// Checks every field.
     pub fn validate(&self) -> Result<(), VehicleError> {
         let check = |field, value: f64, ok: bool, expected| {

@@ -6,19 +6,8 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 /// How the car stands in its spot (the paper's γ).
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Hash,
-    Serialize,
-    Deserialize,
-    clap::ValueEnum,
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "plan", derive(clap::ValueEnum))]
 #[serde(rename_all = "snake_case")]
 pub enum ParkingType {
     /// Bay, nose in.
@@ -58,19 +47,8 @@ impl ParkingType {
 }
 
 /// Difficulty of a generated scene (paper, section V-B).
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Hash,
-    Serialize,
-    Deserialize,
-    clap::ValueEnum,
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "plan", derive(clap::ValueEnum))]
 #[serde(rename_all = "snake_case")]
 pub enum Level {
     /// Wide spots, a dead end in half of the scenes.
@@ -104,7 +82,7 @@ pub struct UnknownName {
     /// The name given.
     pub name: String,
     /// The names that exist.
-    pub expected: &'static str,
+    pub expected: String,
 }
 
 impl FromStr for ParkingType {
@@ -114,7 +92,7 @@ impl FromStr for ParkingType {
         Self::ALL.into_iter().find(|k| k.name() == name).ok_or_else(|| UnknownName {
             what: "parking type",
             name: name.to_owned(),
-            expected: "forward, reverse, parallel",
+            expected: "forward, reverse, parallel".to_owned(),
         })
     }
 }
@@ -126,7 +104,7 @@ impl FromStr for Level {
         Self::ALL.into_iter().find(|l| l.name() == name).ok_or_else(|| UnknownName {
             what: "level",
             name: name.to_owned(),
-            expected: "easy, complex, extreme",
+            expected: "easy, complex, extreme".to_owned(),
         })
     }
 }

@@ -8,8 +8,10 @@
 
 pub mod abstraction;
 pub mod cell;
+#[cfg(any(test, feature = "generate"))]
 pub mod clutter;
 pub mod collision;
+#[cfg(any(test, feature = "generate"))]
 pub mod generate;
 mod kind;
 mod obstacles;

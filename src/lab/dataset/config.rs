@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::schema::{FORMAT_VERSION, GIT_REVISION, Metadata};
-use crate::files::{TomlError, read_toml};
+use crate::lab::toml_file::{TomlError, read_toml};
 use crate::planners::HybridAStarConfig;
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;

@@ -17,10 +17,22 @@ use parry2d_f64::shape::{Cuboid, Segment};
 use parry2d_f64::transformation::convex_polygons_intersection_points;
 use parry2d_f64::utils::point_in_poly2d;
 
+use crate::episode::Judge;
 use crate::geometry::Pose;
 use crate::output::PathFile;
 use crate::vehicle::Vehicle;
 use crate::world::Scene;
+
+/// The independent check of every row.
+pub const JUDGE: Judge = Judge { verdict: "ok", check: judge };
+
+fn judge(scene: &Scene, path: &PathFile, share: Option<f64>) -> Result<f64, String> {
+    let checked = match share {
+        None => check(scene, path),
+        Some(share) => check_cover(scene, path, share),
+    };
+    checked.map_err(|violation| violation.to_string())
+}
 
 /// Footprints are tested at most this far apart along the path, metres; no corner moves more
 /// than twice this between them. For vehicles shorter than [`CHECK_LENGTH`] in proportion.

@@ -99,7 +99,7 @@ pub fn read_csv(path: &Path) -> Result<Vec<Row>, RowsError> {
         }
         let mut fields = split(line);
         fields.resize(fields.len() + missing, String::new());
-        rows.push(Row::from_fields(&fields).map_err(format)?);
+        rows.push(from_fields(&fields).map_err(format)?);
     }
     Ok(rows)
 }
@@ -147,6 +147,39 @@ pub fn write_parquet(path: &Path, rows: &[Row]) -> Result<(), RowsError> {
     writer.write(&batch).map_err(parquet)?;
     writer.close().map_err(parquet)?;
     write_whole(path, &bytes).map_err(|error| RowsError::Io { path: path.to_owned(), error })
+}
+
+/// The row of one line's fields.
+fn from_fields(f: &[String]) -> Result<Row, String> {
+    if f.len() != Row::COLUMNS.len() {
+        return Err(format!("has {} columns; expected {}", f.len(), Row::COLUMNS.len()));
+    }
+    fn parse<T: std::str::FromStr>(f: &[String], i: usize) -> Result<T, String> {
+        f[i].parse().map_err(|_| format!("{} is \"{}\"", Row::COLUMNS[i], f[i]))
+    }
+    fn maybe<T: std::str::FromStr>(f: &[String], i: usize) -> Result<Option<T>, String> {
+        if f[i].is_empty() { Ok(None) } else { parse(f, i).map(Some) }
+    }
+    Ok(Row {
+        scene: f[0].clone(),
+        kind: maybe(f, 1)?,
+        level: maybe(f, 2)?,
+        method: f[3].clone(),
+        ok: parse(f, 4)?,
+        reason: f[5].clone(),
+        plan_time_s: parse(f, 6)?,
+        length_m: maybe(f, 7)?,
+        direction_changes: maybe(f, 8)?,
+        max_abs_steer_rad: maybe(f, 9)?,
+        mean_abs_steer_change_rad: maybe(f, 10)?,
+        nodes: parse(f, 11)?,
+        min_clearance_m: maybe(f, 12)?,
+        fallback: parse(f, 13)?,
+        checked: f[14].clone(),
+        route: f[15].clone(),
+        cost_over_best: maybe(f, 16)?,
+        changes_over_fewest: maybe(f, 17)?,
+    })
 }
 
 /// The fields of one CSV line.

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
+use super::oracle;
 use crate::episode::{self, Case, Episode, EpisodeConfig, Row};
 use crate::n3p::{Method, MethodError, MethodSettings};
 use crate::n3p::{Models, ModelsError};
@@ -222,7 +223,7 @@ where
                         break;
                     }
                     let (case, planner) = (&cases[job / per_case], &mut planners[job % per_case]);
-                    let episode = episode::run(case, planner.as_mut(), &episodes)
+                    let episode = episode::run(case, planner.as_mut(), &episodes, &oracle::JUDGE)
                         .expect("the problem was made once before");
                     if send.send((job, episode)).is_err() {
                         break; // The sink failed: nobody listens any more.

@@ -267,7 +267,7 @@ mod tests {
     fn the_papers_tables_are_complete() {
         let rows = paper_rows();
         assert_eq!(rows.len(), 75);
-        let known = |p: &PaperRow| Method::ALL.iter().any(|m| m.paper_name() == Some(&p.method));
+        let known = |p: &PaperRow| Method::all().any(|m| m.paper_name() == Some(&p.method));
         assert!(rows.iter().all(known));
         assert!(rows.iter().all(|p| p.cells.iter().all(|c| c.parse::<f64>().is_ok())));
     }

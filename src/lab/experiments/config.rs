@@ -4,14 +4,15 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::files::{TomlError, read_toml};
 use crate::lab::dataset::{CollectConfig, Subset};
 use crate::lab::evaluation::SuiteConfig;
 use crate::lab::evaluation::suite::MAX_COUNT;
 use crate::lab::rl::courses::Course;
-use crate::lab::rl::rollout::RolloutConfig;
+use crate::lab::rl::methods::POLICY;
+use crate::lab::toml_file::{TomlError, read_toml};
 use crate::lab::training::MlpConfig;
 use crate::lab::training::rl::RlConfig;
+use crate::n3p::RolloutConfig;
 use crate::n3p::guided::RankedConfig;
 use crate::n3p::{Method, MethodSettings};
 use crate::planners::{Budget, Effort, HybridAStarConfig, Problem};
@@ -77,7 +78,7 @@ pub struct LearningCurveConfig {
 impl LearningCurveConfig {
     /// Whether some method needs the networks.
     pub fn needs_mlp(&self) -> bool {
-        self.methods.contains(&Method::MlpN3p)
+        self.methods.contains(&Method::MLP_N3P)
     }
 
     fn validate(&self, reported_seed: u64) -> Result<(), String> {
@@ -232,7 +233,7 @@ impl ExperimentConfig {
             self.train.rl.validate().map_err(|e| format!("train.rl: {e}"))?;
         }
         let e = &self.evaluate;
-        if e.methods.contains(&Method::Policy) {
+        if e.methods.contains(&POLICY) {
             return Err("evaluate.methods names policy, which only n3p-eval and n3p-plan know; \
                         leave it out"
                 .to_owned());
@@ -281,12 +282,12 @@ impl ExperimentConfig {
 
     /// Where policies learn for the evaluation.
     pub fn courses(&self) -> impl Iterator<Item = Course> {
-        self.evaluate.methods.iter().filter_map(|m| m.course())
+        self.evaluate.methods.iter().filter_map(|m| Course::named(m.course()?))
     }
 
     /// Whether some method needs the networks.
     pub fn needs_mlp(&self) -> bool {
-        self.evaluate.methods.contains(&Method::MlpN3p)
+        self.evaluate.methods.contains(&Method::MLP_N3P)
     }
 
     /// The file with every setting spelt out.

@@ -1,10 +1,10 @@
 //! A trained actor as a policy.
 
+use crate::n3p::Choice;
 use candle_core::{Device, Tensor};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
-use serde::{Deserialize, Serialize};
 
 use super::encoding::InputScale;
 use super::motion::admitted;
@@ -29,17 +29,6 @@ impl Actor {
         let inputs = self.scale.inputs([observation].into_iter(), &Device::Cpu)?;
         self.network.forward(&inputs.each_ref())
     }
-}
-
-/// How an actor's Gaussian becomes an action.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "snake_case")]
-pub enum Choice {
-    /// Drawn, as HOPE does in evaluation too.
-    #[default]
-    Sampled,
-    /// The mean, as far as the mask admits it.
-    Mean,
 }
 
 /// A trained actor that drives.

@@ -45,11 +45,16 @@ impl Stratum {
 
 impl Course {
     /// The name on the command line and in files.
-    pub fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Simple => "simple",
             Self::Eval => "eval",
         }
+    }
+
+    /// The course of a name.
+    pub fn named(name: &str) -> Option<Self> {
+        [Self::Simple, Self::Eval].into_iter().find(|c| c.name() == name)
     }
 
     /// The problem `index` of a seed: the same arguments give the same problem.

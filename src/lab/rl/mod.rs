@@ -13,6 +13,7 @@ pub mod actor;
 pub mod courses;
 pub mod encoding;
 pub mod lidar;
+pub mod methods;
 pub mod motion;
 pub mod network;
 pub mod onnx;

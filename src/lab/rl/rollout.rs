@@ -1,49 +1,16 @@
 //! A policy as a planner: a row of the tables.
 
 use rand_chacha::ChaCha8Rng;
-use serde::{Deserialize, Serialize};
 
-use super::actor::Choice;
 use super::motion::drive;
 use super::senses::Senses;
 use super::{Policy, PolicyFault};
 use crate::curves::Path;
+use crate::n3p::RolloutConfig;
 use crate::planners::{
     Budget, HybridAStarConfig, NoPath, PARKED_COVER, PlanResult, Planner, Problem,
 };
 use crate::rng::{Stream, rng};
-
-/// Rules of a rollout.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct RolloutConfig {
-    /// How a trained actor's Gaussian becomes an action; other policies decide themselves.
-    pub choice: Choice,
-    /// Steps after which a policy has failed.
-    pub horizon: u32,
-    /// Curves to the goal are tried from poses nearer to it than this, metres.
-    pub curve_distance: f64,
-}
-
-impl Default for RolloutConfig {
-    fn default() -> Self {
-        Self { choice: Choice::default(), horizon: 400, curve_distance: 10.0 }
-    }
-}
-
-impl RolloutConfig {
-    /// Checks every setting.
-    pub fn validate(&self) -> Result<(), String> {
-        let within = |field: &str, v: f64, low: f64, high: f64| {
-            if (low..=high).contains(&v) {
-                return Ok(());
-            }
-            Err(format!("{field} is {v}; expected a number from {low} to {high}"))
-        };
-        within("horizon", f64::from(self.horizon), 1.0, 1e6)?;
-        within("curve_distance", self.curve_distance, 0.0, 1000.0)
-    }
-}
 
 /// Drives a policy until a free Reeds-Shepp curve (and entry straight) leads to the goal, or until
 /// the car stands well enough in its spot.

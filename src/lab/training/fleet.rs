@@ -16,9 +16,7 @@ use super::{MlpConfig, TrainingError, card, solved, write_beside};
 use crate::geometry::Pose;
 use crate::lab::dataset::{Dataset, Sample};
 use crate::selectors::artefact;
-use crate::selectors::fleet::{
-    self, FleetHeader, Scaling, UNIT_LAYERS, UnitManoeuvres, in_metres, in_radii,
-};
+use crate::selectors::fleet::{self, FleetHeader, Scaling, UNIT_LAYERS, UnitManoeuvres, in_metres};
 use crate::selectors::network::{LayerWeights, OUTPUTS, outputs_from_pose};
 use crate::selectors::{Features, Normaliser, UNIT_COUNT, UNIT_NAMES};
 use crate::vehicle::Vehicle;
@@ -219,4 +217,10 @@ fn judge(parts: &[Part], predicted: &[Pose]) -> (Errors, Reach) {
         wanted.extend_from_slice(validation);
     }
     (errors(&poses, &wanted), Reach::mean(&reaches))
+}
+
+/// A pose in turning radii of `vehicle`.
+fn in_radii(pose: Pose, vehicle: &Vehicle) -> Pose {
+    let unit = vehicle.turning_radius();
+    Pose { x: pose.x / unit, y: pose.y / unit, ..pose }
 }

@@ -117,9 +117,9 @@ pub fn page(
 /// What kind of method it is, as a class of the style sheet.
 fn family(method: &str) -> &'static str {
     match method.parse::<Method>() {
-        Ok(Method::N3p) => "ours",
-        Ok(Method::MlpN3p | Method::KnnN3p) => "n3p",
-        Ok(Method::RlSimple | Method::RlEval | Method::Policy) => "rl",
+        Ok(m) if m == Method::N3P => "ours",
+        Ok(m) if m.needs_selector() => "n3p",
+        Ok(m) if m.is_policy() => "rl",
         Ok(method) if method.is_graph_search() => "search",
         _ => "other",
     }

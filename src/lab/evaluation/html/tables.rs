@@ -198,7 +198,7 @@ fn span(i: Interval, scale: f64) -> String {
 pub fn paper_ratio(paper: &[PaperRow], group: &Group, summary: &Summary) -> Option<f64> {
     let mean = |p: &PaperRow| p.cells[1].parse::<f64>().expect("a number in the embedded table");
     let mine = table::printed(paper, group.level, group.kind, &summary.method)?;
-    let searches = Method::ALL.into_iter().filter(|m| m.is_graph_search());
+    let searches = Method::all().filter(|m| m.is_graph_search());
     let searches =
         searches.filter_map(|m| table::printed(paper, group.level, group.kind, m.name()));
     let reference = searches.min_by(|a, b| mean(a).total_cmp(&mean(b)))?;

@@ -11,7 +11,7 @@ use super::log::{Point, RlLog, Validation};
 use super::strata::Strata;
 use super::{RlConfig, card, curve};
 use crate::lab::progress;
-use crate::lab::rl::actor::{Actor, ActorPolicy, Choice, normal, random_action};
+use crate::lab::rl::actor::{Actor, ActorPolicy, normal, random_action};
 use crate::lab::rl::courses::{Course, Stratum};
 use crate::lab::rl::encoding::InputScale;
 use crate::lab::rl::network::ACTION;
@@ -21,6 +21,7 @@ use crate::lab::rl::replay::{Replay, Transition};
 use crate::lab::rl::sac::{Losses, Sac};
 use crate::lab::rl::{Action, Observation, Policy};
 use crate::lab::training::{TrainingError, write_beside};
+use crate::n3p::Choice;
 use crate::rng::{Stream, rng};
 use crate::selectors::artefact;
 
