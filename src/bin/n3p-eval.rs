@@ -10,6 +10,7 @@ use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::evaluation::report::{self, Provenance};
 use n3p::evaluation::suite::{self, SuiteConfig, SuiteError};
 use n3p::evaluation::{Case, Method, MethodSettings, Models, Outputs, metrics, quality};
+use n3p::planners::goals::Terms;
 use n3p::progress;
 use n3p::rl::source::PolicySource;
 use n3p::training;
@@ -67,6 +68,10 @@ struct Args {
     /// is nearer to one. Never less than 5 mm where they allow it.
     #[arg(long, default_value_t = 0.0, value_name = "METRES", value_parser = cli::margin, allow_hyphen_values = true)]
     margin: f64,
+    /// Allow starts and goals to reach so many metres into an obstacle, 0 to 0.2, where localisation
+    /// errs: such contact is only left, or only entered at the goal, and never deepened.
+    #[arg(long, default_value_t = 0.0, value_name = "METRES", value_parser = cli::contact, allow_hyphen_values = true)]
+    allow_contact: f64,
     /// Expansion budget per scene and method.
     #[arg(long, default_value_t = 200_000, value_name = "N")]
     max_expansions: usize,
@@ -102,6 +107,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
         settings: MethodSettings::default(),
         max_expansions: args.max_expansions,
         margin_m: args.margin,
+        allow_contact_m: args.allow_contact,
         threads: args.threads.into(),
     };
     if args.policy.is_some() && !config.methods.contains(&Method::Policy) {
@@ -167,7 +173,8 @@ struct Chosen {
 
 fn choose(args: &Args, vehicle: &Vehicle, methods: &[Method], models: &Models) -> Result<Chosen> {
     if let Some(dir) = &args.scenes {
-        let folder = suite::from_folder(dir, args.kind, args.margin).or_bad_input()?;
+        let terms = Terms { margin: args.margin, contact: args.allow_contact };
+        let folder = suite::from_folder(dir, args.kind, terms).or_bad_input()?;
         folder.unusable.iter().for_each(|line| tracing::warn!("left out: {line}"));
         let complaint = folder.complaint();
         let left_out = complaint.as_ref().map_or(String::new(), |text| format!("; {text}"));

@@ -5,9 +5,9 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, error::Category};
 
+use super::ParkingType;
 use super::goals::GoalTolerance;
 use super::scene::{Scene, SceneError};
-use super::ParkingType;
 use crate::geometry::Pose;
 use crate::vehicle::Vehicle;
 
