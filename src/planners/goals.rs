@@ -1,8 +1,7 @@
 //! Plans a scene with any planner: to the cheapest of its goals, or within their tolerance.
 //!
-//! A scene is a list of candidates, each a [`Problem`] with one goal: every goal of the scene, and
-//! where there is a tolerance also the poses that stand for it. Planners know nothing of each
-//! other's goals. Costs are those of [`CostModel`]. What cannot become the
+//! A scene is a list of [`Problem`]s with one goal each: every goal of the scene, and where there is
+//! a tolerance also the poses that stand for it. Planners know nothing of that. Costs are those of [`CostModel`]. What cannot become the
 //! cheapest, because the shortest curve through empty space costs too much already, is not planned.
 //! The order of the goals does not matter, but among equals the first is taken.
 
@@ -38,7 +37,8 @@ pub struct Planned {
     pub problem: Problem,
     /// What was found; expansions are those of all goals.
     pub result: PlanResult,
-    /// Goals that cannot be parked at, and why, in the order of the scene.
+    /// Goals that cannot be parked at, and why, in the order of the scene; of those that cost more
+    /// anyway nobody asked.
     pub passed_over: Vec<(usize, PassedOver)>,
 }
 
@@ -53,26 +53,15 @@ pub enum PassedOver {
     NoPath(NoPath),
 }
 
-/// One goal of a scene.
-struct Candidate {
-    index: usize,
-    /// The problem with exactly this goal, unless the car does not fit there.
-    exact: Option<Problem>,
-    /// The problems of poses within its tolerance, in a fixed order.
-    beside: Vec<Problem>,
-    /// What any path to any of them costs at least.
-    bound: f64,
-}
-
 /// The problem by which a scene is introduced to those who need one before it is planned: that of its
 /// first goal that is free. An error where there is none.
 pub fn first_problem(scene: &Scene, terms: Terms) -> Result<Problem, ProblemError> {
     let mut errors = Vec::new();
-    for (index, &goal) in scene.all_goals().iter().enumerate() {
-        match candidate(scene, index, goal, terms, true)? {
-            Ok(Candidate { exact, beside, .. }) => {
-                return Ok(exact.into_iter().chain(beside).next().expect("a candidate has one"));
-            }
+    for index in 0..scene.all_goals().len() {
+        let goal = Goal::new(scene, index, terms);
+        let exact = goal.exact()?;
+        match exact.or_else(|error| goal.beside().find_map(|p| p.map(Ok)).unwrap_or(Err(error))) {
+            Ok(problem) => return Ok(problem),
             Err(error) => errors.push((index, error)),
         }
     }
@@ -84,93 +73,158 @@ fn none_free(scene: &Scene, mut errors: Vec<(usize, ProblemError)>) -> ProblemEr
     if scene.goals.is_empty() {
         return errors.remove(0).1;
     }
+    errors.sort_by_key(|(index, _)| *index);
     let field = |(i, error)| (scene.goal_field(i), error);
     ProblemError::NoGoalFree(errors.into_iter().map(field).collect())
 }
 
-/// The candidate of one goal, or why the car does not fit there. Other errors are the scene's.
-/// With `one` no more problems than one are made.
-fn candidate(
-    scene: &Scene,
+/// One goal of a scene. Its problems are made one at a time: each holds all obstacles.
+struct Goal<'a> {
+    scene: &'a Scene,
     index: usize,
-    goal: Pose,
+    pose: Pose,
     terms: Terms,
-    one: bool,
-) -> Result<Result<Candidate, ProblemError>, ProblemError> {
-    let to = |pose: Pose| {
+    model: CostModel,
+}
+
+impl<'a> Goal<'a> {
+    fn new(scene: &'a Scene, index: usize, terms: Terms) -> Self {
+        let model = CostModel::default().scaled(scene.vehicle.scale());
+        Self { scene, index, pose: scene.all_goals()[index], terms, model }
+    }
+
+    /// The problem with exactly this goal, or why the car does not fit there. Other errors are the
+    /// scene's.
+    fn exact(&self) -> Result<Result<Problem, ProblemError>, ProblemError> {
+        let Terms { margin, contact } = self.terms;
         let single;
         // Most scenes have one goal and are not copied.
-        let scene = if scene.goals.is_empty() && pose == scene.goal {
-            scene
+        let scene = if self.scene.goals.is_empty() {
+            self.scene
         } else {
-            single = scene.with_goal(pose);
+            single = self.scene.with_goal(self.pose);
             &single
         };
-        match Problem::allowing_contact(scene, terms.margin, terms.contact) {
-            Ok(problem) => Ok(Ok(problem)),
+        match Problem::allowing_contact(scene, margin, contact) {
             Err(error @ ProblemError::GoalInCollision(..)) => Ok(Err(error)),
-            Err(error) => Err(error),
-        }
-    };
-    let (exact, error) = match to(goal)? {
-        Ok(problem) => (Some(problem), None),
-        Err(error) => (None, Some(error)),
-    };
-    let mut beside = Vec::new();
-    if let Some(tolerance) = scene.goal_tolerance {
-        let mut poses = tolerance.poses(goal).split_off(1);
-        // Who stands within the tolerance may stay there.
-        if tolerance.holds(goal, scene.start, 0.0) && goal != scene.start {
-            poses.insert(0, scene.start);
-        }
-        for pose in poses {
-            if one && (exact.is_some() || !beside.is_empty()) {
-                break;
-            }
-            if let Ok(mut problem) = to(pose)? {
-                let centre = problem.frame.local_from_world(goal);
-                problem.tolerance = Some((centre, tolerance));
-                beside.push(problem);
-            }
+            other => other.map(Ok),
         }
     }
-    Ok(match error {
-        Some(error) if beside.is_empty() => Err(error),
-        _ => {
-            let bounds = exact.iter().chain(&beside).map(least_cost_near);
-            let bound = bounds.fold(f64::INFINITY, f64::min);
-            Ok(Candidate { index, exact, beside, bound })
+
+    /// The poses within its tolerance that are tried besides the goal itself, in a fixed order.
+    fn poses_beside(&self) -> Vec<Pose> {
+        let Some(tolerance) = self.scene.goal_tolerance else { return Vec::new() };
+        let mut poses = tolerance.poses(self.pose).split_off(1);
+        // Who stands within the tolerance may stay there.
+        if tolerance.holds(self.pose, self.scene.start, 0.0) {
+            poses.insert(0, self.scene.start);
         }
-    })
+        poses
+    }
+
+    /// The problem of one of [`Goal::poses_beside`]; `None` where the car does not fit.
+    fn to(&self, pose: Pose) -> Option<Problem> {
+        let scene = self.scene.with_goal(pose);
+        let mut problem =
+            Problem::unexplained(&scene, self.terms.margin, self.terms.contact).ok()?;
+        let centre = problem.frame.local_from_world(self.pose);
+        problem.tolerance = self.scene.goal_tolerance.map(|tolerance| (centre, tolerance));
+        Some(problem)
+    }
+
+    /// The problems of all these poses.
+    fn beside(&self) -> impl Iterator<Item = Option<Problem>> + '_ {
+        self.poses_beside().into_iter().map(|pose| self.to(pose))
+    }
+
+    /// What driving to `pose` costs at least, obstacles aside.
+    fn least_cost_to(&self, pose: Pose) -> f64 {
+        let Scene { start, vehicle, .. } = self.scene;
+        // As far from the origin as the scene lies numbers are coarser.
+        let here = Pose::new(0.0, 0.0, start.heading);
+        let there = Pose::new(pose.x - start.x, pose.y - start.y, pose.heading);
+        let length = reeds_shepp::shortest_length(here, there, 1.0 / vehicle.max_curvature());
+        // A rounding less, so that equals are compared by what they cost.
+        self.per_metre() * length * (1.0 - 1e-9)
+    }
+
+    /// What driving to the goal or anywhere within its tolerance costs at least.
+    fn least_cost(&self) -> f64 {
+        let Some(tolerance) = self.scene.goal_tolerance else {
+            return self.least_cost_to(self.pose);
+        };
+        let apart = self.scene.start.distance(self.pose) - tolerance.position_m;
+        self.per_metre() * apart.max(0.0) * (1.0 - 1e-9)
+    }
+
+    fn per_metre(&self) -> f64 {
+        self.model.forward.min(self.model.backward)
+    }
+
+    /// The cheapest path that `planner` finds there, exactly to the goal or within its tolerance, or
+    /// why the car does not fit.
+    fn plan(
+        &self,
+        planner: &mut dyn Planner,
+        budget: Budget,
+    ) -> Result<Result<Found, ProblemError>, ProblemError> {
+        let found = |problem: Problem, result: PlanResult| {
+            let result = ended_early(&problem, result);
+            let path = result.outcome.as_ref();
+            let cost = |path: &Path| self.model.path(&problem.vehicle, &path.segments);
+            let cost = path.map_or(f64::INFINITY, cost);
+            Found { index: self.index, problem, result, cost }
+        };
+        let exact = self.exact()?.map(|problem| {
+            let result = contact::plan(planner, &problem, budget);
+            found(problem, result)
+        });
+        let mut expansions = exact.as_ref().map_or(0, |b| b.result.expansions);
+        let mut best = exact;
+        let mut left = budget.max_expansions;
+        for pose in self.poses_beside() {
+            let beaten = |b: &Found| left == 0 || b.beats(self.least_cost_to(pose));
+            if best.as_ref().is_ok_and(beaten) {
+                continue;
+            }
+            let Some(problem) = self.to(pose) else { continue };
+            // Who has arrived already stays.
+            let stays = PlanResult::certified(&problem, Path::new(problem.start, []), 0);
+            let result = match stays.outcome {
+                Ok(_) => stays,
+                Err(_) => contact::plan(planner, &problem, Budget { max_expansions: left }),
+            };
+            expansions += result.expansions;
+            left = left.saturating_sub(result.expansions);
+            let other = found(problem, result);
+            if best.as_ref().is_ok_and(|b| b.rank() <= other.rank()) {
+                continue;
+            }
+            best = Ok(other);
+        }
+        Ok(best.map(|b| Found { result: PlanResult { expansions, ..b.result }, ..b }))
+    }
 }
 
-/// What driving from start to goal costs at least, obstacles aside.
-fn least_cost(problem: &Problem) -> f64 {
-    let radius = 1.0 / problem.vehicle.max_curvature();
-    let length = reeds_shepp::shortest_length(problem.start, problem.goal, radius);
-    // A rounding less, so that equals are compared by what they cost.
-    per_metre(problem) * length * (1.0 - 1e-9)
+/// What came of one goal.
+struct Found {
+    index: usize,
+    problem: Problem,
+    result: PlanResult,
+    cost: f64,
 }
 
-/// What driving from the start to the goal or anywhere within its tolerance costs at least.
-fn least_cost_near(problem: &Problem) -> f64 {
-    problem.tolerance.map_or_else(
-        || least_cost(problem),
-        |(goal, t)| per_metre(problem) * (problem.start.distance(goal) - t.position_m).max(0.0),
-    )
-}
+impl Found {
+    /// What is compared: contact at the goal that can be avoided is, whatever it costs.
+    fn rank(&self) -> (bool, f64) {
+        (self.problem.contact.as_ref().is_some_and(|c| c.goal_depth > 0.0), self.cost)
+    }
 
-fn per_metre(problem: &Problem) -> f64 {
-    let model = model(problem);
-    model.forward.min(model.backward)
-}
-
-fn model(problem: &Problem) -> CostModel {
-    CostModel::default().scaled(problem.vehicle.scale())
-}
-
-fn cost(problem: &Problem, segments: &[Segment]) -> f64 {
-    model(problem).path(&problem.vehicle, segments)
+    /// Whether nothing that costs `bound` or more can be better.
+    fn beats(&self, bound: f64) -> bool {
+        let (touches, cost) = self.rank();
+        !touches && cost <= bound
+    }
 }
 
 /// Plans `scene` by `planner` to the cheapest of its goals.
@@ -183,95 +237,43 @@ pub fn plan(
     terms: Terms,
     budget: Budget,
 ) -> Result<Planned, ProblemError> {
-    let mut candidates = Vec::new();
-    let mut errors = Vec::new();
-    for (index, &goal) in scene.all_goals().iter().enumerate() {
-        match candidate(scene, index, goal, terms, false)? {
-            Ok(candidate) => candidates.push(candidate),
-            Err(error) => errors.push((index, error)),
-        }
-    }
-    if candidates.is_empty() {
-        return Err(none_free(scene, errors));
-    }
-    let not_free = |(index, error)| (index, PassedOver::NotFree(error));
-    let mut passed_over: Vec<_> = errors.into_iter().map(not_free).collect();
+    scene.check_numbers()?;
+    let goals = (0..scene.all_goals().len()).map(|index| Goal::new(scene, index, terms));
+    let mut goals: Vec<(f64, Goal)> = goals.map(|goal| (goal.least_cost(), goal)).collect();
     // The nearest first: what they cost leaves out most of the others. Sorting is stable.
-    candidates.sort_by(|a, b| a.bound.total_cmp(&b.bound));
+    goals.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut best: Option<Found> = None;
     let mut failed: Option<Found> = None;
+    let (mut errors, mut no_path) = (Vec::new(), Vec::new());
     let mut expansions = 0;
-    for candidate in candidates {
-        let (index, bound) = (candidate.index, candidate.bound);
-        if best.as_ref().is_some_and(|b| bound > b.cost) {
+    for (bound, goal) in goals {
+        if best.as_ref().is_some_and(|b| b.beats(bound) && b.cost < bound) {
             break;
         }
-        let found = plan_one(planner, candidate, budget);
-        expansions += found.result.expansions;
-        match &found.result.outcome {
-            Ok(_) => {
-                let better = |b: &Found| (found.cost, index) < (b.cost, b.index);
-                if best.as_ref().is_none_or(better) {
-                    best = Some(found);
-                }
+        let found = match goal.plan(planner, budget)? {
+            Ok(found) => found,
+            Err(error) => {
+                errors.push((goal.index, error));
+                continue;
             }
-            Err(reason) => {
-                passed_over.push((index, PassedOver::NoPath(*reason)));
-                failed = failed.or(Some(found));
-            }
-        }
-    }
-    passed_over.sort_by_key(|(index, _)| *index);
-    let found = best.or(failed).expect("there is a candidate");
-    let Found { index: goal_index, problem, result, .. } = found;
-    let result = PlanResult { expansions, ..result };
-    Ok(Planned { goal_index, problem, result, passed_over })
-}
-
-/// What came of one goal.
-struct Found {
-    index: usize,
-    problem: Problem,
-    result: PlanResult,
-    cost: f64,
-}
-
-/// The cheapest path to a goal, exactly there or within its tolerance.
-fn plan_one(planner: &mut dyn Planner, candidate: Candidate, budget: Budget) -> Found {
-    let Candidate { index, exact, beside, .. } = candidate;
-    let found = |problem: Problem, result: PlanResult| {
-        let result = ended_early(&problem, result);
-        let path = result.outcome.as_ref();
-        let cost = path.map_or(f64::INFINITY, |path| cost(&problem, &path.segments));
-        Found { index, problem, result, cost }
-    };
-    let mut best = exact.map(|problem| {
-        let result = contact::plan(planner, &problem, budget);
-        found(problem, result)
-    });
-    let mut expansions = best.as_ref().map_or(0, |b| b.result.expansions);
-    let mut left = budget.max_expansions;
-    for problem in beside {
-        let known = best.as_ref().map_or(f64::INFINITY, |b| b.cost);
-        if best.is_some() && (left == 0 || least_cost(&problem) >= known) {
-            continue;
-        }
-        // Who has arrived already stays.
-        let stays = PlanResult::certified(&problem, Path::new(problem.start, []), 0);
-        let result = match stays.outcome {
-            Ok(_) => stays,
-            Err(_) => contact::plan(planner, &problem, Budget { max_expansions: left }),
         };
-        expansions += result.expansions;
-        left = left.saturating_sub(result.expansions);
-        let other = found(problem, result);
-        if best.as_ref().is_none_or(|b| other.cost < b.cost) {
-            best = Some(other);
+        expansions += found.result.expansions;
+        if let Err(reason) = found.result.outcome {
+            no_path.push((goal.index, reason));
+            failed = failed.or(Some(found));
+        } else if best.as_ref().is_none_or(|b| (found.rank(), found.index) < (b.rank(), b.index)) {
+            best = Some(found);
         }
     }
-    let mut best = best.expect("a candidate has a problem");
-    best.result.expansions = expansions;
-    best
+    let Some(Found { index: goal_index, problem, result, .. }) = best.or(failed) else {
+        return Err(none_free(scene, errors));
+    };
+    let result = PlanResult { expansions, ..result };
+    let not_free = errors.into_iter().map(|(index, error)| (index, PassedOver::NotFree(error)));
+    let no_path = no_path.into_iter().map(|(index, reason)| (index, PassedOver::NoPath(reason)));
+    let mut passed_over: Vec<_> = not_free.chain(no_path).collect();
+    passed_over.sort_by_key(|(index, _)| *index);
+    Ok(Planned { goal_index, problem, result, passed_over })
 }
 
 /// The same plan, ended where it first comes within the tolerance.

@@ -1,7 +1,7 @@
 //! A problem: a scene in planning coordinates, indexed and checked.
 
 use super::contact::{Contact, depth_into};
-use crate::geometry::{Frame, Pose, Vec2};
+use crate::geometry::{Aabb, Frame, Pose, Vec2};
 use crate::vehicle::{Gear, Vehicle};
 use crate::world::cell::{Cell, Grid};
 use crate::world::collision::CollisionWorld;
@@ -74,6 +74,21 @@ pub enum ProblemError {
     NoGoalFree(Vec<(String, ProblemError)>),
 }
 
+impl ProblemError {
+    /// The same error, saying what it is that start or goal of `scene` touch.
+    fn explained(self, scene: &Scene) -> ProblemError {
+        match self {
+            Self::StartInCollision(..) => {
+                Self::StartInCollision(scene.start.into(), Conflict::of(scene, scene.start))
+            }
+            Self::GoalInCollision(..) => {
+                Self::GoalInCollision(scene.goal.into(), Conflict::of(scene, scene.goal))
+            }
+            other => other,
+        }
+    }
+}
+
 /// What is wrong with each goal, in one line.
 fn listed(goals: &[(String, ProblemError)]) -> String {
     let one = |(field, error): &(String, ProblemError)| match error {
@@ -113,10 +128,14 @@ impl Conflict {
             let (obstacles, points) = (obstacles.to_vec(), points.to_vec());
             Scene { obstacles, points, ..empty.clone() }.geometry().ok()
         };
-        let lists = scene.obstacles.chunks(1).map(|o| single(o, &[])).enumerate();
-        let lists = lists.map(|(i, o)| (format!("obstacles[{i}]"), o));
-        let points = scene.points.chunks(1).map(|p| single(&[], p)).enumerate();
-        let points = points.map(|(i, o)| (format!("points[{i}]"), o));
+        let body = vehicle.footprint_at(pose).aabb().inflated(1e-3);
+        let is_near = |corners: &[[f64; 2]]| {
+            Aabb::around(corners.iter().map(|&[x, y]| Vec2::new(x, y))).intersects(&body)
+        };
+        let lists = scene.obstacles.chunks(1).enumerate().filter(|(_, o)| is_near(&o[0]));
+        let lists = lists.map(|(i, o)| (format!("obstacles[{i}]"), single(o, &[])));
+        let points = scene.points.chunks(1).enumerate().filter(|(_, p)| is_near(p));
+        let points = points.map(|(i, p)| (format!("points[{i}]"), single(&[], p)));
         let mut deepest: Option<(String, f64)> = None;
         for (obstacle, one) in lists.chain(points) {
             let Some(one) = one else { continue };
@@ -163,6 +182,7 @@ impl Problem {
     /// where nothing is to be the same anywhere on a map.
     pub fn as_given(scene: &Scene) -> Result<Problem, ProblemError> {
         Self::seen(scene, Keeping { margin: Self::MARGIN, contact: 0.0 }, Precision::Given)
+            .map_err(|error| error.explained(scene))
     }
 
     /// The problem of a scene whose plans keep `margin` metres from obstacles, and
@@ -181,6 +201,16 @@ impl Problem {
     /// there is contact `margin` is 0. [`goals::plan`](super::goals::plan) plans such
     /// problems best; a planner alone often finds nothing that is certified.
     pub fn allowing_contact(
+        scene: &Scene,
+        margin: f64,
+        contact: f64,
+    ) -> Result<Problem, ProblemError> {
+        Self::unexplained(scene, margin, contact).map_err(|error| error.explained(scene))
+    }
+
+    /// [`Problem::allowing_contact`] whose errors do not say what start or goal touch: finding that
+    /// out takes a while.
+    pub(super) fn unexplained(
         scene: &Scene,
         margin: f64,
         contact: f64,
@@ -212,15 +242,7 @@ impl Problem {
         };
         let seen =
             Self::checked(scene.vehicle, frame, kind, [start, goal], obstacles, bounds, keeping);
-        let mut problem = seen.map_err(|e| match e {
-            ProblemError::StartInCollision(..) => {
-                ProblemError::StartInCollision(scene.start.into(), Conflict::of(scene, scene.start))
-            }
-            ProblemError::GoalInCollision(..) => {
-                ProblemError::GoalInCollision(scene.goal.into(), Conflict::of(scene, scene.goal))
-            }
-            other => other,
-        })?;
+        let mut problem = seen?;
         problem.tolerance = scene.goal_tolerance.map(|tolerance| (goal, tolerance));
         Ok(problem)
     }
