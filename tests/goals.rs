@@ -204,7 +204,8 @@ fn no_planner_ends_beyond_the_tolerance() {
     }
     // Within it a path is ended as soon as it may be.
     for metres in [4.91, 5.0, 5.09] {
-        assert!((plan(metres, &open).unwrap().length() - 4.905).abs() < 0.01);
+        let length = plan(metres, &open).unwrap().length();
+        assert!((length - 4.905).abs() < 0.01, "{metres}: {length}");
     }
     assert_eq!(
         plan(4.91, &Scene { goal_tolerance: None, ..open.clone() }),
@@ -275,7 +276,7 @@ fn without_any_goal_to_drive_to_there_is_no_path() {
     );
     // Beyond the wall.
     let goals = format!("\"goals\": [{}, [0, 14, 0], [5, 14, 0]]", taken(-5.4));
-    n3p_plan(&three_bays(&goals), &["--max-expansions", "2000"])
+    n3p_plan(&three_bays(&goals), &["--max-expansions", "5"])
         .code(3)
         .stderr(contains("goals[0] is left out").and(contains("goals[1] is left out: ")));
 }
@@ -297,8 +298,7 @@ fn what_are_no_goals_is_refused_by_field_and_value() {
         (format!("\"goals\": [{pose}, [3e4, 2, 3]]"), ["from goals[1]", "at most 10000 m"]),
         (format!("\"goals\": [{many}]"), ["goals has 257 poses", "at most 256"]),
     ] {
-        let field = if field.is_empty() { "\"source\": \"\"".to_owned() } else { field };
-        let field = field.replace("\"source\": \"\"", "\"bounds\": null");
+        let field = if field.is_empty() { "\"points\": []".to_owned() } else { field };
         let run = n3p_plan(&three_bays(&field), &[]).code(2);
         let stderr = String::from_utf8_lossy(&run.get_output().stderr).into_owned();
         let parts = parts.iter().all(|part| stderr.contains(part));
@@ -311,7 +311,7 @@ fn what_are_no_goals_is_refused_by_field_and_value() {
 fn what_is_no_tolerance_is_refused_by_field_and_value() {
     for (value, parts) in [
         ("7", ["goal_tolerance is 7", "position_m"]),
-        ("[0.1, 0.1]", ["goal_tolerance is [0.1,0.1]", "heading_rad"]),
+        ("true", ["goal_tolerance is true", "heading_rad"]),
         ("{\"position_m\": \"a\"}", ["goal_tolerance.position_m is \"a\"", "finite number"]),
         ("{\"position_m\": NaN}", ["position_m", "not a number"]),
         ("{\"position_m\": -0.1}", ["goal_tolerance.position_m is -0.1", "from 0 to 1 m"]),

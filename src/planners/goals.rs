@@ -283,7 +283,9 @@ fn ended_early(problem: &Problem, result: PlanResult) -> PlanResult {
     else {
         return result;
     };
-    let Some(path) = up_to(path, |pose| tolerance.holds(goal, pose, 0.0)) else { return result };
+    // Half of what the certificate forgives: headings that are to be equal differ by roundings.
+    let arrived = |pose| tolerance.holds(goal, pose, Problem::ROUNDING / 2.0);
+    let Some(path) = up_to(path, arrived) else { return result };
     let early = PlanResult::certified(problem, path, result.expansions);
     match early.outcome {
         Ok(_) => PlanResult { guidance: result.guidance, ..early },
