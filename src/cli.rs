@@ -84,6 +84,11 @@ pub fn margin(text: &str) -> Result<f64, String> {
     within(text, 0.0..=Problem::MAX_MARGIN, "metres")
 }
 
+/// Parses the metres of `--allow-contact`.
+pub fn contact(text: &str) -> Result<f64, String> {
+    within(text, 0.0..=Problem::MAX_CONTACT, "metres")
+}
+
 /// Runs a binary's body and maps its error to stderr and an exit code.
 pub fn run(body: impl FnOnce() -> anyhow::Result<ExitCode>) -> ExitCode {
     let level = std::env::var("N3P_LOG").ok().and_then(|level| level.parse().ok());

@@ -37,12 +37,17 @@ pub mod geometry;
 pub mod lab;
 pub mod n3p;
 pub mod output;
+mod parker;
 pub mod planners;
 #[cfg(any(test, feature = "generate"))]
 pub mod rng;
 pub mod selectors;
 pub mod vehicle;
 pub mod world;
+
+pub use n3p::{Method, Models};
+pub use parker::{Lot, Parker, ParkerError, Plan, PlanError, Request};
+pub use vehicle::Vehicle;
 
 /// The programs in the README compile and run.
 #[cfg(all(doctest, feature = "lab"))]

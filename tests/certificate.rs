@@ -24,6 +24,8 @@ fn ahead(obstacles: Vec<Vec<[f64; 2]>>, points: Vec<[f64; 2]>) -> Scene {
         vehicle: Vehicle::default(),
         start: Pose::new(0.0, 0.0, 0.0),
         goal: Pose::new(20.0, 0.0, 0.0),
+        goals: Vec::new(),
+        goal_tolerance: None,
         parking_type: None,
         obstacles,
         points,

@@ -81,6 +81,7 @@ fn everything_at_once() {
     let cell = Cell { kind: ParkingType::Reverse, lane_width: 6.0, spot_width: 3.0, dead_end: 8.0 };
     let regions = grid.regions(&cell).map(|r| Polygon::rectangle(Pose::default(), r));
     let drawing = Drawing {
+        other_goals: Vec::new(),
         method: Some("knn-n3p"),
         path: Some(&path),
         regions: Some(regions),

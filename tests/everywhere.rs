@@ -204,6 +204,8 @@ fn narrow_doors_and_long_ways_round_are_found() {
         vehicle,
         start,
         goal,
+        goals: Vec::new(),
+        goal_tolerance: None,
         parking_type: None,
         obstacles,
         points: vec![],

@@ -135,6 +135,7 @@ fn no_margin_is_the_usual_one() {
             settings: MethodSettings::default(),
             budget: BUDGET,
             margin_m,
+            allow_contact_m: 0.0,
             threads: 1,
         };
         let mut rows =

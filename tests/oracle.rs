@@ -21,6 +21,8 @@ fn around(path: &Path, obstacles: Vec<Vec<[f64; 2]>>) -> (Scene, PathFile) {
         vehicle: Vehicle::default(),
         start: path.start,
         goal: path.end(),
+        goals: Vec::new(),
+        goal_tolerance: None,
         parking_type: None,
         obstacles,
         points: vec![],

@@ -15,6 +15,7 @@ use n3p::lab::progress;
 use n3p::lab::rl::methods::POLICY;
 use n3p::lab::training;
 use n3p::n3p::{Method, MethodSettings, Models};
+use n3p::planners::goals::Terms;
 use n3p::planners::{Budget, Effort};
 use n3p::vehicle::Vehicle;
 use n3p::world::{Level, ParkingType};
@@ -65,6 +66,10 @@ struct Args {
     /// is nearer to one. Never less than 5 mm where they allow it.
     #[arg(long, default_value_t = 0.0, value_name = "METRES", value_parser = cli::margin, allow_hyphen_values = true)]
     margin: f64,
+    /// Allow starts and goals to reach so many metres into an obstacle, 0 to 0.2, where localisation
+    /// errs: such contact is only left, or only entered at the goal, and never deepened.
+    #[arg(long, default_value_t = 0.0, value_name = "METRES", value_parser = cli::contact, allow_hyphen_values = true)]
+    allow_contact: f64,
     /// Expansion budget per scene and method.
     #[arg(long, default_value_t = 200_000, value_name = "N")]
     max_expansions: usize,
@@ -104,6 +109,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
         settings: MethodSettings::default(),
         budget: Budget { max_expansions: args.max_expansions, effort: args.effort },
         margin_m: args.margin,
+        allow_contact_m: args.allow_contact,
         threads: args.threads.into(),
     };
     if args.policy.is_given() && !config.methods.contains(&POLICY) {
@@ -169,7 +175,8 @@ struct Chosen {
 
 fn choose(args: &Args, vehicle: &Vehicle, methods: &[Method], models: &Models) -> Result<Chosen> {
     if let Some(dir) = &args.scenes {
-        let folder = suite::from_folder(dir, args.kind, args.margin).or_bad_input()?;
+        let terms = Terms { margin: args.margin, contact: args.allow_contact };
+        let folder = suite::from_folder(dir, args.kind, terms).or_bad_input()?;
         folder.unusable.iter().for_each(|line| tracing::warn!("left out: {line}"));
         let complaint = folder.complaint();
         let left_out = complaint.as_ref().map_or(String::new(), |text| format!("; {text}"));

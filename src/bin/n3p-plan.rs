@@ -17,9 +17,11 @@ use n3p::episode::{Case, Episode, EpisodeConfig, Judge, SpotReport};
 use n3p::output::drawing::{Drawing, scene_svg};
 
 use n3p::files::{check_writable, reason, write_whole};
+use n3p::geometry::{Pose, signed_angle};
 use n3p::n3p::{Driver, Method, MethodSettings, Models, catalogue};
 use n3p::output::TrajectoryFile;
-use n3p::planners::{Budget, Effort, Problem};
+use n3p::planners::goals::{self, PassedOver, Terms};
+use n3p::planners::{Budget, Effort, Problem, ProblemError};
 use n3p::world::Scene;
 
 /// Plans a path for one parking scene.
@@ -48,6 +50,10 @@ struct Args {
     /// is nearer to one. Never less than 5 mm where they allow it.
     #[arg(long, default_value_t = 0.0, value_name = "METRES", value_parser = cli::margin, allow_hyphen_values = true)]
     margin: f64,
+    /// Allow start and goal to reach so many metres into an obstacle, 0 to 0.2, as localisation
+    /// errs: such contact is only left, or only entered at the goal, and never deepened.
+    #[arg(long, default_value_t = 0.0, value_name = "METRES", value_parser = cli::contact, allow_hyphen_values = true)]
+    allow_contact: f64,
     /// Write the path to this JSON file.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -133,8 +139,12 @@ fn plan(args: &Args) -> Result<ExitCode> {
     let file = args.scene.as_deref().expect("clap asks for it");
     let scene = Scene::read(file).or_bad_input()?;
     let file = file.display();
-    let problem = Problem::with_margin(&scene, args.margin)
-        .map_err(|e| BadInput(format!("{file}: {e}; move it to where the car fits")))?;
+    let terms = Terms { margin: args.margin, contact: args.allow_contact };
+    let problem = goals::first_problem(&scene, terms).map_err(|e| {
+        let than = format!(" (--allow-contact {} m is not enough)", args.allow_contact);
+        let more = if args.allow_contact > 0.0 { &than } else { "" };
+        BadInput(format!("{file}: {e}{more}; move it to where the car fits"))
+    })?;
     let unwritable = |path: &Path, e: io::Error| {
         let text =
             format!("{}: cannot be written: {}; choose another file", path.display(), reason(&e));
@@ -143,7 +153,7 @@ fn plan(args: &Args) -> Result<ExitCode> {
     for path in args.out.iter().chain(&args.svg).chain(&args.trajectory) {
         check_writable(path).map_err(|e| unwritable(path, e))?;
     }
-    if problem.margin < args.margin {
+    if problem.margin < args.margin && problem.contact.is_none() {
         tracing::warn!(
             "start or goal is nearer to an obstacle than --margin {}: the path may come as near as \
              {} m to that obstacle",
@@ -157,21 +167,30 @@ fn plan(args: &Args) -> Result<ExitCode> {
     // One run, as it comes: the time includes what a first call costs.
     let budget = Budget { max_expansions: args.max_expansions, effort: args.effort };
     let usual = EpisodeConfig::new(budget);
-    let once = EpisodeConfig { repeats: 0, margin_m: args.margin, ..usual };
+    let once = EpisodeConfig {
+        repeats: 0,
+        margin_m: args.margin,
+        allow_contact_m: args.allow_contact,
+        ..usual
+    };
     let episode = episode::run(&case, planner.as_mut(), &once, &JUDGE)?;
+    tell(&case.scene, &episode);
+    // From here on the scene has the goal that was chosen.
+    let whole = case.scene;
+    let scene = whole.with_goal(whole.all_goals()[episode.goal_index]);
 
     if let (Some(out), Some(path)) = (&args.out, &episode.path) {
         path.write(out).or_bad_input()?;
     }
     if let Some(svg) = &args.svg {
-        let picture = picture(&case.scene, &episode, method, &models);
+        let picture = picture(&whole, &scene, &episode, method, &models);
         write_whole(svg, picture.as_bytes()).map_err(|e| unwritable(svg, e))?;
     }
     // Nobody should drive a path that the independent check refuses.
     let trajectory = match (&args.trajectory, &episode.result.outcome) {
         (Some(file), Ok(path)) if episode.row.ok => {
             let (frame, limits) = (&episode.problem.frame, args.limits.settings());
-            let made = TrajectoryFile::new(&case.scene, frame, path, method.name(), limits)?;
+            let made = TrajectoryFile::new(&scene, frame, path, method.name(), limits)?;
             made.write(file).map_err(|e| unwritable(file, e))?;
             Some(made.report)
         }
@@ -181,8 +200,13 @@ fn plan(args: &Args) -> Result<ExitCode> {
         let Episode { row, path, problem, .. } = &episode;
         let (spot, margin) = (SpotReport::new(&episode, &models), problem.margin);
         let covered = episode.result.covered;
+        let contact = problem.contact.as_ref();
+        let contact =
+            contact.map(|c| serde_json::json!({"start": c.start_depth, "goal": c.goal_depth}));
+        let goal = path.as_ref().filter(|_| !whole.goals.is_empty()).map(|_| episode.goal_index);
         let mut result = serde_json::json!({
             "row": row, "path": path, "margin_m": margin, "covered": covered, "spot": spot,
+            "goal_index": goal, "contact_m": contact,
         });
         if let Some(report) = &trajectory {
             result["trajectory"] = serde_json::json!(report);
@@ -196,7 +220,9 @@ fn plan(args: &Args) -> Result<ExitCode> {
             )
         });
         let time = trajectory.as_ref().map(in_time);
-        cli::print(summary(&episode) + &spot.unwrap_or_default() + &time.unwrap_or_default())?;
+        cli::print(
+            summary(&whole, &episode) + &spot.unwrap_or_default() + &time.unwrap_or_default(),
+        )?;
     }
     match (&episode.path, episode.row.ok) {
         (None, _) => Ok(ExitCode::from(cli::EXIT_NO_PATH)),
@@ -275,7 +301,47 @@ fn outside_policy(_: &Args) -> Result<Option<(Method, Arc<dyn Driver>)>> {
     Ok(None)
 }
 
-fn summary(episode: &Episode) -> String {
+/// What was found out about goals and contact, on stderr.
+fn tell(scene: &Scene, episode: &Episode) {
+    for (index, reason) in &episode.passed_over {
+        match reason {
+            PassedOver::NotFree(ProblemError::GoalInCollision(_, conflict)) => {
+                tracing::warn!("{} is left out: it {conflict}", scene.goal_field(*index));
+            }
+            // Of a single goal the result says it.
+            PassedOver::NoPath(reason) if !scene.goals.is_empty() => {
+                tracing::warn!("{} is left out: {reason}", scene.goal_field(*index));
+            }
+            _ => {}
+        }
+    }
+    let Some(path) = &episode.path else { return };
+    if !scene.goals.is_empty() {
+        let (field, count) = (scene.goal_field(episode.goal_index), scene.goals.len());
+        tracing::info!("the path leads to {field}, the cheapest of {count}");
+    }
+    if let (Some(end), true) = (path.poses.last(), scene.goal_tolerance.is_some()) {
+        let goal = scene.all_goals()[episode.goal_index];
+        let (apart, turn) = {
+            let end = Pose::from(*end);
+            (goal.distance(end), signed_angle(goal.heading, end.heading))
+        };
+        tracing::info!("it ends {apart:.3} m and {turn:.4} rad from there, within the tolerance");
+    }
+    if let Some(contact) = &episode.problem.contact {
+        for (what, verb, depth) in
+            [("start", "leaves", contact.start_depth), ("goal", "enters", contact.goal_depth)]
+        {
+            if depth > 0.0 {
+                tracing::warn!(
+                    "the {what} reaches {depth:.3} m into an obstacle: the path only {verb} it there"
+                );
+            }
+        }
+    }
+}
+
+fn summary(scene: &Scene, episode: &Episode) -> String {
     let (row, margin) = (&episode.row, episode.problem.margin);
     let time = row.plan_time_s * 1e3;
     let (Some(length), Some(changes)) = (row.length_m, row.direction_changes) else {
@@ -286,15 +352,18 @@ fn summary(episode: &Episode) -> String {
         );
     };
     let clearance = row.min_clearance_m.map_or("nothing near".to_owned(), |c| format!("{c:.3} m"));
-    let mut lines = vec![
-        format!("{}: path by {}", row.scene, row.method),
+    let mut lines = vec![format!("{}: path by {}", row.scene, row.method)];
+    if !scene.goals.is_empty() {
+        lines.push(format!("  goal              {}", scene.goal_field(episode.goal_index)));
+    }
+    lines.extend([
         format!("  length            {length:.2} m"),
         format!("  direction changes {changes}"),
         format!("  clearance         {clearance}"),
         format!("  margin            {margin} m"),
         format!("  planning time     {time:.3} ms"),
         format!("  expansions        {}", row.nodes),
-    ];
+    ]);
     if let Some(guidance) = &episode.result.guidance {
         lines.push(format!("  route             {}", guidance.route.explanation()));
     }
@@ -314,13 +383,21 @@ fn in_time(report: &TrajectoryReport) -> String {
     )
 }
 
-/// The scene, and over it the path and what N3P made of the spot.
-fn picture(scene: &Scene, episode: &Episode, method: Method, models: &Models) -> String {
+/// The scene with its chosen goal, and over it the path, what N3P made of the spot, and the goals that
+/// the whole scene has besides.
+fn picture(
+    whole: &Scene,
+    scene: &Scene,
+    episode: &Episode,
+    method: Method,
+    models: &Models,
+) -> String {
     let frame = &episode.problem.frame;
     let path = episode.result.outcome.as_ref().ok().map(|p| p.to_world(frame));
     let preparatory = episode.result.guidance.as_ref().and_then(|g| g.preparatory);
     let drawing = Drawing {
         method: Some(method.name()),
+        other_goals: whole.goals.iter().copied().filter(|&goal| goal != scene.goal).collect(),
         path: path.as_ref(),
         regions: n3p::episode::regions(episode, models),
         preparatory: preparatory.map(|p| frame.world_from_local(p)),

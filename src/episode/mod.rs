@@ -10,6 +10,7 @@ pub use spot_report::{SpotReport, abstraction, regions};
 use std::time::Instant;
 
 use crate::output::PathFile;
+use crate::planners::goals::{self, PassedOver, Planned, Terms};
 use crate::planners::{Budget, PARKED_COVER, PlanResult, Planner, Problem, ProblemError};
 use crate::world::{Level, ParkingType, Scene};
 
@@ -32,6 +33,8 @@ pub struct EpisodeConfig {
     /// Clearance that plans keep where start and goal allow it, metres, 0 to 1: see
     /// [`Problem::with_margin`].
     pub margin_m: f64,
+    /// How deep start and goal may reach into obstacles, metres: see [`Problem::allowing_contact`].
+    pub allow_contact_m: f64,
     /// At most so many timed runs after the first.
     pub repeats: usize,
     /// No further run begins once the runs so far took this long together, seconds.
@@ -41,7 +44,13 @@ pub struct EpisodeConfig {
 impl EpisodeConfig {
     /// The usual timing and margin with `budget`.
     pub fn new(budget: Budget) -> Self {
-        Self { budget, margin_m: Problem::MARGIN, repeats: 5, repeat_within_s: 0.05 }
+        let Terms { margin: margin_m, contact: allow_contact_m } = Terms::default();
+        Self { budget, margin_m, allow_contact_m, repeats: 5, repeat_within_s: 0.05 }
+    }
+
+    /// What plans keep to.
+    pub fn terms(&self) -> Terms {
+        Terms { margin: self.margin_m, contact: self.allow_contact_m }
     }
 }
 
@@ -49,22 +58,26 @@ impl EpisodeConfig {
 pub struct Judge {
     /// What it says of a path that it accepts: [`Row::checked`].
     pub verdict: &'static str,
-    /// The smallest distance to an obstacle, metres, or why it refuses the path. The third argument
-    /// is the share of the parked footprint that must be covered, where a path need not end exactly at
-    /// the goal.
-    pub check: fn(&Scene, &PathFile, Option<f64>) -> Result<f64, String>,
+    /// The smallest distance to an obstacle, metres, or why it refuses the path. The other
+    /// arguments: the share of the parked footprint that must be covered, where a path need not end
+    /// exactly at the goal, and how deep start and goal may reach into obstacles, metres.
+    pub check: fn(&Scene, &PathFile, Option<f64>, f64) -> Result<f64, String>,
 }
 
 /// Nobody: the path has passed the exact swept check of [`PlanResult::certified`], and is measured.
 pub const CERTIFICATE: Judge =
-    Judge { verdict: "certified", check: |scene, path, _| Ok(clearance::of(scene, path)) };
+    Judge { verdict: "certified", check: |scene, path, _, _| Ok(clearance::of(scene, path)) };
 
 /// What an episode leaves.
 #[derive(Clone, Debug)]
 pub struct Episode {
     /// The row.
     pub row: Row,
-    /// The problem as the planner saw it.
+    /// Which of the scene's goals the path leads to.
+    pub goal_index: usize,
+    /// Goals that the path could not lead to, and why.
+    pub passed_over: Vec<(usize, PassedOver)>,
+    /// The problem of that goal as the planner saw it.
     pub problem: Problem,
     /// What the planner returned.
     pub result: PlanResult,
@@ -88,12 +101,13 @@ pub fn run(
     config: &EpisodeConfig,
     judge: &Judge,
 ) -> Result<Episode, ProblemError> {
-    let (problem, result, first_s) = timed(&case.scene, planner, config)?;
+    let (planned, first_s) = timed(&case.scene, planner, config)?;
+    let Planned { goal_index, problem, result, passed_over } = planned;
     let mut times = Vec::new();
     let mut total_s = first_s;
     let mut repeatable = true;
     while total_s < config.repeat_within_s && times.len() < config.repeats {
-        let (_, again, seconds) = timed(&case.scene, planner, config)?;
+        let (Planned { result: again, .. }, seconds) = timed(&case.scene, planner, config)?;
         repeatable &= again.outcome == result.outcome && again.expansions == result.expansions;
         times.push(seconds);
         total_s += seconds;
@@ -103,23 +117,22 @@ pub fn run(
     }
     times.sort_by(f64::total_cmp);
     let mut row = blank_row(case, planner.name(), times[times.len() / 2]);
-    let path = describe(case, &problem, &result, judge, &mut row);
+    let path = describe(case, goal_index, &problem, &result, (config, judge), &mut row);
     if !repeatable {
         row.ok = false;
         row.reason = UNREPEATABLE.to_owned();
     }
-    Ok(Episode { row, problem, result, path })
+    Ok(Episode { row, goal_index, passed_over, problem, result, path })
 }
 
 fn timed(
     scene: &Scene,
     planner: &mut dyn Planner,
     config: &EpisodeConfig,
-) -> Result<(Problem, PlanResult, f64), ProblemError> {
+) -> Result<(Planned, f64), ProblemError> {
     let start = Instant::now();
-    let problem = Problem::with_margin(scene, config.margin_m)?;
-    let result = planner.plan(&problem, config.budget);
-    Ok((problem, result, start.elapsed().as_secs_f64()))
+    let planned = goals::plan(planner, scene, config.terms(), config.budget)?;
+    Ok((planned, start.elapsed().as_secs_f64()))
 }
 
 fn blank_row(case: &Case, method: &str, plan_time_s: f64) -> Row {
@@ -148,9 +161,10 @@ fn blank_row(case: &Case, method: &str, plan_time_s: f64) -> Row {
 /// Fills `row` from the result; returns the exported path, if any.
 fn describe(
     case: &Case,
+    goal_index: usize,
     problem: &Problem,
     result: &PlanResult,
-    judge: &Judge,
+    (config, judge): (&EpisodeConfig, &Judge),
     row: &mut Row,
 ) -> Option<PathFile> {
     row.nodes = result.expansions as u32;
@@ -170,8 +184,11 @@ fn describe(
     row.direction_changes = Some(path.direction_changes() as u32);
     row.max_abs_steer_rad = Some(vehicle.steer(path.max_abs_curvature()));
     row.mean_abs_steer_change_rad = Some(path.mean_abs_steer_change(vehicle));
-    let file = PathFile::new(&case.scene, &problem.frame, path, &row.method);
-    match (judge.check)(&case.scene, &file, result.covered.map(|_| PARKED_COVER)) {
+    // Checked against the goal that it claims to lead to.
+    let scene = case.scene.with_goal(case.scene.all_goals()[goal_index]);
+    let file = PathFile::new(&scene, &problem.frame, path, &row.method);
+    let share = result.covered.map(|_| PARKED_COVER);
+    match (judge.check)(&scene, &file, share, config.allow_contact_m) {
         Ok(clearance) => {
             row.ok = true;
             row.min_clearance_m = Some(clearance).filter(|c| c.is_finite());

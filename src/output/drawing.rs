@@ -21,6 +21,8 @@ pub struct Drawing<'a> {
     pub regions: Option<[Polygon; 2]>,
     /// The preparatory pose (rear axle).
     pub preparatory: Option<Pose>,
+    /// Goals that the scene has besides the one drawn as such.
+    pub other_goals: Vec<Pose>,
     /// One more remark for the title, such as why there is no path.
     pub note: Option<&'a str>,
 }
@@ -45,6 +47,8 @@ const FOOTPRINT_STEP: f64 = 0.8;
 const INK: &str = "#1f2933";
 const START: &str = "#1d4ed8";
 const GOAL: &str = "#15803d";
+const OTHER_GOAL: &str = r##"fill="none" stroke="#15803d" stroke-dasharray="3 4""##;
+const TOLERANCE: &str = r##"fill="#15803d" fill-opacity=".25" stroke="#15803d""##;
 const PREPARATORY: &str = "#8b2fc9";
 const FORWARD: &str = "#2f7de1";
 const BACKWARD: &str = "#e8710a";
@@ -101,6 +105,7 @@ fn view(scene: &Scene, drawing: &Drawing) -> Aabb {
     let corners = |pose| scene.vehicle.footprint_at(pose).vertices().to_vec();
     let mut shown = corners(scene.start);
     shown.extend(corners(scene.goal));
+    shown.extend(drawing.other_goals.iter().flat_map(|&goal| corners(goal)));
     shown.extend(drawing.preparatory.into_iter().flat_map(corners));
     shown.extend(
         drawing.path.into_iter().flat_map(|p| p.sample(STEP)).flat_map(|s| corners(s.pose)),
@@ -149,7 +154,14 @@ impl Map {
         if let Some(path) = drawing.path {
             self.footprints(path, vehicle);
         }
+        for goal in &drawing.other_goals {
+            self.polygon(vehicle.footprint_at(*goal).vertices(), OTHER_GOAL);
+        }
         self.car(scene.goal, vehicle, GOAL, "");
+        if let Some(tolerance) = scene.goal_tolerance {
+            let radius = self.scale * tolerance.position_m;
+            self.dot(scene.goal.position(), radius, TOLERANCE);
+        }
         if let Some(pose) = drawing.preparatory {
             self.car(pose, vehicle, PREPARATORY, r#" stroke-dasharray="7 4""#);
         }
@@ -286,6 +298,12 @@ fn legend(scene: &Scene, drawing: &Drawing) -> Vec<Entry> {
     let dot = |style: &str| format!(r#"<circle cx="13" cy="7" r="4.5" {style}/>"#);
 
     let mut entries = vec![(car(START, ""), "start"), (car(GOAL, ""), "goal")];
+    if !drawing.other_goals.is_empty() {
+        entries.push((area(OTHER_GOAL), "other goals"));
+    }
+    if scene.goal_tolerance.is_some() {
+        entries.push((dot(TOLERANCE), "goal tolerance"));
+    }
     if drawing.preparatory.is_some() {
         entries.push((car(PREPARATORY, r#" stroke-dasharray="5 3""#), "preparatory pose"));
     }

@@ -168,6 +168,8 @@ pub(super) mod tests {
             vehicle: Vehicle::default(),
             start,
             goal: frame.world_from_local(path.end()),
+            goals: Vec::new(),
+            goal_tolerance: None,
             parking_type: None,
             obstacles: vec![],
             points: vec![],

@@ -5,16 +5,19 @@
 //! `open` (queues), `lattice` (visited states), `cost_to_go` and `nonholonomic` (the two
 //! heuristics), [`analytic`] (Reeds-Shepp expansion) and [`cost`]. Its variants are
 //! [`PlainHybridAStar`] (no curves), [`MultiHeuristicHybridAStar`] and
-//! [`ScenarioHybridAStar`] (parallel spots). [`library`] does without any search; `approach`
+//! [`ScenarioHybridAStar`] (parallel spots). [`goals`] plans a scene with any of them: to the
+//! cheapest of its goals, and out of a contact (`contact`). [`library`] does without any search; `approach`
 //! estimates the ways to its manoeuvres.
 
 pub mod analytic;
 mod approach;
 mod budget;
 mod config;
+mod contact;
 pub mod cost;
 mod cost_to_go;
 mod exit_manoeuvre;
+pub mod goals;
 pub mod hybrid_astar;
 mod joint;
 mod lattice;
@@ -32,6 +35,7 @@ mod shortcut;
 pub use analytic::AnalyticTail;
 pub use budget::{Budget, Effort};
 pub use config::{GoalRegion, HybridAStarConfig, Resolution};
+pub use contact::Contact;
 pub use hybrid_astar::HybridAStar;
 pub use multi_heuristic::{MultiHeuristicConfig, MultiHeuristicHybridAStar};
 pub use plain::PlainHybridAStar;
@@ -39,7 +43,7 @@ pub use problem::{Conflict, Problem, ProblemError};
 pub use scenario::ScenarioHybridAStar;
 
 use crate::curves::Path;
-use crate::geometry::{Pose, signed_angle};
+use crate::geometry::Pose;
 
 /// Anything that plans a path. Implementations keep buffers between calls; results
 /// never depend on earlier calls.
@@ -66,13 +70,10 @@ pub struct PlanResult {
 }
 
 impl PlanResult {
-    /// A result with `path`, which must pass the exact check from the start to the goal
-    /// and keep the steering limit: the certificate every planner's path leaves with.
+    /// A result with `path`, which must pass the exact check from the start to the goal (or where
+    /// its tolerance lets it end) and keep the steering limit: the certificate every planner's path leaves with.
     pub fn certified(problem: &Problem, path: Path, expansions: usize) -> Self {
-        let end = path.end();
-        let arrives = end.distance(problem.goal) < END_TOLERANCE
-            && signed_angle(end.heading, problem.goal.heading).abs() < END_TOLERANCE;
-        if arrives && is_drivable(problem, &path) {
+        if problem.is_arrival(path.end()) && is_drivable(problem, &path) {
             Self { outcome: Ok(path), covered: None, expansions, guidance: None }
         } else {
             Self::none(NoPath::Uncertified, expansions)
@@ -100,16 +101,15 @@ impl PlanResult {
 /// at the goal (the paper's 90 %).
 pub const PARKED_COVER: f64 = 0.9;
 
-/// Ends of a path may differ from start and goal by accumulated rounding only.
-const END_TOLERANCE: f64 = 1e-6;
-
-/// Whether a path begins at the start, keeps the steering limit and touches nothing.
+/// Whether a path begins at the start, keeps the steering limit and touches nothing but what the
+/// start or the goal may touch, which it only leaves or only enters.
 fn is_drivable(problem: &Problem, path: &Path) -> bool {
     /// Stored curvatures are rounded to single precision.
     const ROUNDING: f64 = 1.0 + 1e-6;
     path.max_abs_curvature() <= problem.vehicle.max_curvature() * ROUNDING
-        && path.start.distance(problem.start) < END_TOLERANCE
+        && path.start.distance(problem.start) < Problem::ROUNDING
         && problem.collision.path_is_free(path)
+        && problem.contact.as_ref().is_none_or(|c| c.is_only_left(&problem.vehicle, path))
 }
 
 /// Why there is no path.

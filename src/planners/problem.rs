@@ -1,12 +1,13 @@
 //! A problem: a scene in planning coordinates, indexed and checked.
 
-use crate::geometry::{Frame, Pose, Vec2};
+use super::contact::{Contact, depth_into};
+use crate::geometry::{Aabb, Frame, Pose, Vec2};
 use crate::vehicle::{Gear, Vehicle};
 use crate::world::cell::{Cell, Grid};
 use crate::world::collision::CollisionWorld;
 use crate::world::scene::InvalidField;
 use crate::world::spot::{self, Precision, SpotGuess};
-use crate::world::{ObstacleError, Obstacles, ParkingType, Scene};
+use crate::world::{GoalTolerance, ObstacleError, Obstacles, ParkingType, Scene};
 
 /// What planners see: everything in the planning frame (the spot frame where the scene
 /// has a spot, else the goal's own frame), so that results do not depend on where in the
@@ -29,6 +30,19 @@ pub struct Problem {
     pub collision: CollisionWorld,
     /// Clearance that plans keep from obstacles, metres: see [`Problem::with_margin`].
     pub margin: f64,
+    /// What start or goal touches, where that is allowed: see [`Problem::allowing_contact`].
+    pub contact: Option<Contact>,
+    /// Where plans may end besides the goal: within this tolerance of this pose, planning frame.
+    pub tolerance: Option<(Pose, GoalTolerance)>,
+}
+
+/// What is asked of a plan besides reaching its goal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Keeping {
+    /// Clearance from obstacles, metres.
+    pub margin: f64,
+    /// How deep start and goal may reach into obstacles, metres.
+    pub contact: f64,
 }
 
 /// A problem that has no solution by its own data.
@@ -43,12 +57,47 @@ pub enum ProblemError {
     /// A margin that no plan can keep.
     #[error("margin is {0} m; expected a number from 0 to {max}", max = Problem::MAX_MARGIN)]
     Margin(f64),
+    /// An allowance for contact that is none.
+    #[error(
+        "allowed contact is {0} m; expected a number from 0 to {max}",
+        max = Problem::MAX_CONTACT
+    )]
+    Contact(f64),
     /// The start footprint touches an obstacle or its axle is out of bounds.
     #[error("start: the footprint at {0:?} {1}")]
     StartInCollision([f64; 3], Conflict),
     /// The goal footprint touches an obstacle or its axle is out of bounds.
     #[error("goal: the footprint at {0:?} {1}")]
     GoalInCollision([f64; 3], Conflict),
+    /// The same of every one of several goals: their fields and why.
+    #[error("no goal is free: {}", listed(.0))]
+    NoGoalFree(Vec<(String, ProblemError)>),
+}
+
+impl ProblemError {
+    /// The same error, saying what it is that start or goal of `scene` touch.
+    fn explained(self, scene: &Scene) -> ProblemError {
+        match self {
+            Self::StartInCollision(..) => {
+                Self::StartInCollision(scene.start.into(), Conflict::of(scene, scene.start))
+            }
+            Self::GoalInCollision(..) => {
+                Self::GoalInCollision(scene.goal.into(), Conflict::of(scene, scene.goal))
+            }
+            other => other,
+        }
+    }
+}
+
+/// What is wrong with each goal, in one line.
+fn listed(goals: &[(String, ProblemError)]) -> String {
+    let one = |(field, error): &(String, ProblemError)| match error {
+        ProblemError::GoalInCollision(pose, conflict) => {
+            format!("{field}: the footprint at {pose:?} {conflict}")
+        }
+        other => format!("{field}: {other}"),
+    };
+    goals.iter().map(one).collect::<Vec<_>>().join("; ")
 }
 
 /// What keeps a car from standing where it is to start or to park.
@@ -79,23 +128,20 @@ impl Conflict {
             let (obstacles, points) = (obstacles.to_vec(), points.to_vec());
             Scene { obstacles, points, ..empty.clone() }.geometry().ok()
         };
-        let lists = scene.obstacles.chunks(1).map(|o| single(o, &[])).enumerate();
-        let lists = lists.map(|(i, o)| (format!("obstacles[{i}]"), o));
-        let points = scene.points.chunks(1).map(|p| single(&[], p)).enumerate();
-        let points = points.map(|(i, o)| (format!("points[{i}]"), o));
+        let body = vehicle.footprint_at(pose).aabb().inflated(1e-3);
+        let is_near = |corners: &[[f64; 2]]| {
+            Aabb::around(corners.iter().map(|&[x, y]| Vec2::new(x, y))).intersects(&body)
+        };
+        let lists = scene.obstacles.chunks(1).enumerate().filter(|(_, o)| is_near(&o[0]));
+        let lists = lists.map(|(i, o)| (format!("obstacles[{i}]"), single(o, &[])));
+        let points = scene.points.chunks(1).enumerate().filter(|(_, p)| is_near(p));
+        let points = points.map(|(i, p)| (format!("points[{i}]"), single(&[], p)));
         let mut deepest: Option<(String, f64)> = None;
         for (obstacle, one) in lists.chain(points) {
             let Some(one) = one else { continue };
-            // The margin at which it is free: negative where the car reaches in.
-            let is_free =
-                |depth: f64| CollisionWorld::new(&one, None, vehicle, -depth).pose_is_free(pose);
-            if is_free(0.0) {
+            let free = depth_into(&CollisionWorld::new(&one, None, vehicle, 0.0), vehicle, pose);
+            if free == 0.0 {
                 continue;
-            }
-            let (mut touching, mut free) = (0.0, vehicle.width.min(vehicle.length) / 2.0);
-            while free - touching > 1e-4 {
-                let middle = f64::midpoint(touching, free);
-                *(if is_free(middle) { &mut free } else { &mut touching }) = middle;
             }
             if deepest.as_ref().is_none_or(|(_, depth)| free > *depth) {
                 deepest = Some((obstacle, free));
@@ -116,8 +162,16 @@ impl Problem {
     /// interpolate sampled poses linearly.
     pub const MARGIN: f64 = 0.005;
 
+    /// Ends of a path may differ from start and goal by accumulated rounding only, metres and
+    /// radians.
+    pub(super) const ROUNDING: f64 = 1e-6;
+
     /// The largest margin that can be asked for, metres.
     pub const MAX_MARGIN: f64 = 1.0;
+
+    /// The deepest contact that can be allowed, metres: more than localisation errs by, and less
+    /// than what a car is made of can be mistaken for.
+    pub const MAX_CONTACT: f64 = 0.2;
 
     /// The problem of a scene, with the usual [`Problem::MARGIN`].
     pub fn new(scene: &Scene) -> Result<Problem, ProblemError> {
@@ -127,7 +181,8 @@ impl Problem {
     /// [`Problem::new`] without rounding anything ([`Precision`]): what policies are trained in,
     /// where nothing is to be the same anywhere on a map.
     pub fn as_given(scene: &Scene) -> Result<Problem, ProblemError> {
-        Self::seen(scene, Self::MARGIN, Precision::Given)
+        Self::seen(scene, Keeping { margin: Self::MARGIN, contact: 0.0 }, Precision::Given)
+            .map_err(|error| error.explained(scene))
     }
 
     /// The problem of a scene whose plans keep `margin` metres from obstacles, and
@@ -138,13 +193,42 @@ impl Problem {
     /// where that is less than one, and 0 where they do not allow that either. The field `margin`
     /// says what it came to. From all others the plan keeps what was asked for.
     pub fn with_margin(scene: &Scene, margin: f64) -> Result<Problem, ProblemError> {
+        Self::allowing_contact(scene, margin, 0.0)
+    }
+
+    /// [`Problem::with_margin`] for a start or a goal that may reach up to `contact` metres into
+    /// obstacles, because those who measured it err: see [`Contact`] for what plans keep then. Where
+    /// there is contact `margin` is 0. [`goals::plan`](super::goals::plan) plans such
+    /// problems best; a planner alone often finds nothing that is certified.
+    pub fn allowing_contact(
+        scene: &Scene,
+        margin: f64,
+        contact: f64,
+    ) -> Result<Problem, ProblemError> {
+        Self::unexplained(scene, margin, contact).map_err(|error| error.explained(scene))
+    }
+
+    /// [`Problem::allowing_contact`] whose errors do not say what start or goal touch: finding that
+    /// out takes a while.
+    pub(super) fn unexplained(
+        scene: &Scene,
+        margin: f64,
+        contact: f64,
+    ) -> Result<Problem, ProblemError> {
         if !(0.0..=Self::MAX_MARGIN).contains(&margin) {
             return Err(ProblemError::Margin(margin));
         }
-        Self::seen(scene, margin, Precision::Rounded)
+        if !(0.0..=Self::MAX_CONTACT).contains(&contact) {
+            return Err(ProblemError::Contact(contact));
+        }
+        Self::seen(scene, Keeping { margin, contact }, Precision::Rounded)
     }
 
-    fn seen(scene: &Scene, margin: f64, precision: Precision) -> Result<Problem, ProblemError> {
+    fn seen(
+        scene: &Scene,
+        keeping: Keeping,
+        precision: Precision,
+    ) -> Result<Problem, ProblemError> {
         scene.check_numbers()?;
         let SpotGuess { frame, kind, obstacles } = spot::guess(scene, precision)?;
         let bounds = scene.bounds.map(|b| spot::bounds_in_frame(b, &frame, precision));
@@ -156,19 +240,11 @@ impl Problem {
                 scene.vehicle.rear_axle(Pose::new(0.0, 0.0, kind.goal_heading()))
             }),
         };
-        Self::checked(scene.vehicle, frame, kind, [start, goal], obstacles, bounds, margin).map_err(
-            |e| match e {
-                ProblemError::StartInCollision(..) => ProblemError::StartInCollision(
-                    scene.start.into(),
-                    Conflict::of(scene, scene.start),
-                ),
-                ProblemError::GoalInCollision(..) => ProblemError::GoalInCollision(
-                    scene.goal.into(),
-                    Conflict::of(scene, scene.goal),
-                ),
-                other => other,
-            },
-        )
+        let seen =
+            Self::checked(scene.vehicle, frame, kind, [start, goal], obstacles, bounds, keeping);
+        let mut problem = seen?;
+        problem.tolerance = scene.goal_tolerance.map(|tolerance| (goal, tolerance));
+        Ok(problem)
     }
 
     /// The problem of parking in an abstracted environment, as the data collection does.
@@ -180,29 +256,36 @@ impl Problem {
     ) -> Result<Problem, ProblemError> {
         let goal = grid.goal(cell.kind, &vehicle);
         let (walls, ends) = (grid.walls(cell)?, [start, goal]);
-        Self::checked(vehicle, Frame::WORLD, Some(cell.kind), ends, walls, None, Self::MARGIN)
+        let keeping = Keeping { margin: Self::MARGIN, contact: 0.0 };
+        Self::checked(vehicle, Frame::WORLD, Some(cell.kind), ends, walls, None, keeping)
     }
 
-    fn checked(
+    pub(super) fn checked(
         vehicle: Vehicle,
         frame: Frame,
         kind: Option<ParkingType>,
         [start, goal]: [Pose; 2],
         obstacles: Obstacles,
         bounds: Option<[Vec2; 4]>,
-        margin: f64,
+        keeping: Keeping,
     ) -> Result<Problem, ProblemError> {
         let least = Self::MARGIN * vehicle.scale();
-        let mut margin = if margin > Self::MARGIN { margin.max(least) } else { least };
+        let asked = keeping.margin;
+        let mut margin = if asked > Self::MARGIN { asked.max(least) } else { least };
         let mut collision = CollisionWorld::new(&obstacles, bounds, &vehicle, margin);
+        let mut contact = None;
         let ends_are_free =
             |world: &CollisionWorld| world.pose_is_free(start) && world.pose_is_free(goal);
         if !ends_are_free(&collision) {
             // What is next to start or goal keeps the whole plan from the margin, but only from
             // its own: everything else is kept as far away as was asked for.
             let alone = |one: &Obstacles, margin| CollisionWorld::new(one, None, &vehicle, margin);
-            let (kept, close) = obstacles.partition(|one| ends_are_free(&alone(one, margin)));
+            let (kept, mut close) = obstacles.partition(|one| ends_are_free(&alone(one, margin)));
             let far = CollisionWorld::new(&kept, bounds, &vehicle, margin);
+            let mut touched = Obstacles::default();
+            if keeping.contact > 0.0 {
+                (close, touched) = close.partition(|one| ends_are_free(&alone(one, 0.0)));
+            }
             for smaller in Self::margins_below(margin, least) {
                 margin = smaller;
                 if ends_are_free(&alone(&close, margin)) {
@@ -210,6 +293,14 @@ impl Problem {
                 }
             }
             collision = far.tolerating(&close, &vehicle, margin);
+            if !touched.is_empty() {
+                let found = Contact::new(&touched, &vehicle, [start, goal], bounds, asked);
+                let depth = found.start_depth.max(found.goal_depth);
+                // Where it is deeper than allowed the shrunken car still touches, and is refused.
+                let shrunk = -depth.min(keeping.contact);
+                collision = collision.tolerating(&touched, &vehicle, shrunk);
+                (margin, contact) = (0.0, Some(found));
+            }
         }
         if !collision.pose_is_free(start) {
             return Err(ProblemError::StartInCollision(start.into(), Conflict::Unknown));
@@ -217,7 +308,25 @@ impl Problem {
         if !collision.pose_is_free(goal) {
             return Err(ProblemError::GoalInCollision(goal.into(), Conflict::Unknown));
         }
-        Ok(Problem { vehicle, frame, kind, start, goal, obstacles, collision, margin })
+        Ok(Problem {
+            vehicle,
+            frame,
+            kind,
+            start,
+            goal,
+            obstacles,
+            collision,
+            margin,
+            contact,
+            tolerance: None,
+        })
+    }
+
+    /// Whether a path that ends at `pose` has arrived: at the goal, or within the tolerance that the
+    /// scene gives.
+    pub fn is_arrival(&self, pose: Pose) -> bool {
+        let exactly = GoalTolerance::default().holds(self.goal, pose, Self::ROUNDING);
+        exactly || self.tolerance.is_some_and(|(goal, t)| t.holds(goal, pose, Self::ROUNDING))
     }
 
     /// What is tried in turn where start or goal does not allow `margin`, metres.

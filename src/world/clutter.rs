@@ -79,6 +79,8 @@ pub fn clutter(seed: u64, index: u64) -> Scene {
         vehicle,
         start,
         goal,
+        goals: Vec::new(),
+        goal_tolerance: None,
         parking_type: None,
         obstacles: Vec::new(),
         points: Vec::new(),

@@ -1,6 +1,6 @@
 //! The world a car parks in: scenes, collision, cells and the abstraction.
 //!
-//! In reading order: a [`Scene`] is what a user gives ([`mod@scene`] reads files, [`mod@tpcap`] a
+//! In reading order: a [`Scene`] is what a user gives ([`mod@scene`] reads files, [`goals`] is where paths may end, [`mod@tpcap`] a
 //! benchmark's, [`mod@generate`] makes scenes, [`mod@clutter`] some that are no parking
 //! lots); [`spot`] finds the spot frame that everything below works in; [`Obstacles`] is a scene's geometry in any frame; [`collision`] answers
 //! whether a motion is free; [`cell`] defines the abstracted environments 𝓔 of the paper and
@@ -13,12 +13,15 @@ pub mod clutter;
 pub mod collision;
 #[cfg(any(test, feature = "generate"))]
 pub mod generate;
+pub mod goals;
 mod kind;
 mod obstacles;
 pub mod scene;
+mod scene_file;
 pub mod spot;
 pub mod tpcap;
 
+pub use goals::GoalTolerance;
 pub use kind::{Level, ParkingType, UnknownName};
 pub use obstacles::{ObstacleError, Obstacles};
 pub use scene::Scene;

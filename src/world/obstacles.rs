@@ -83,13 +83,19 @@ impl Obstacles {
             part.polylines.extend(one.polylines);
             part.points.extend(one.points);
         };
-        let none = Obstacles::default;
-        self.polygons.iter().for_each(|p| take(Obstacles { polygons: vec![p.clone()], ..none() }));
-        self.polylines
-            .iter()
-            .for_each(|l| take(Obstacles { polylines: vec![l.clone()], ..none() }));
-        self.points.iter().for_each(|&p| take(Obstacles { points: vec![p], ..none() }));
+        self.each().for_each(&mut take);
         parts
+    }
+
+    /// Each of them alone.
+    pub fn each(&self) -> impl Iterator<Item = Obstacles> + '_ {
+        let none = Obstacles::default;
+        let polygons = self.polygons.iter();
+        let polygons = polygons.map(move |p| Obstacles { polygons: vec![p.clone()], ..none() });
+        let walls = self.polylines.iter();
+        let walls = walls.map(move |w| Obstacles { polylines: vec![w.clone()], ..none() });
+        let points = self.points.iter().map(move |&p| Obstacles { points: vec![p], ..none() });
+        polygons.chain(walls).chain(points)
     }
 
     /// Whether there is nothing.

@@ -12,8 +12,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, error::Category};
 
+use super::goals::GoalTolerance;
+use super::scene_file::{SceneFile, parse_json};
 use super::{ObstacleError, Obstacles, ParkingType, tpcap};
 use crate::files::{reason, write_whole};
 use crate::geometry::{Polygon, Polyline, Pose, Vec2};
@@ -21,30 +22,30 @@ use crate::vehicle::Vehicle;
 
 /// A parking scene in its own (world) frame; metres and radians.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "SceneFile", into = "SceneFile")]
 pub struct Scene {
     /// Name, used in rows and file names.
-    #[serde(default)]
     pub name: String,
     /// Where it comes from, for people.
-    #[serde(default)]
     pub source: String,
     /// The car.
     pub vehicle: Vehicle,
     /// Rear-axle pose to start from.
     pub start: Pose,
-    /// Rear-axle pose to park at.
+    /// Rear-axle pose to park at; of several [`Scene::goals`] the first.
     pub goal: Pose,
+    /// Where there is a choice: the poses to park at, of which any will do. Empty where `goal` is
+    /// the only one; see [`Scene::all_goals`].
+    pub goals: Vec<Pose>,
+    /// How far from its goal a path may end; exactly there where it is `None`.
+    pub goal_tolerance: Option<GoalTolerance>,
     /// A hint of how the goal lies in its spot.
-    #[serde(default)]
     pub parking_type: Option<ParkingType>,
     /// Simple polygons, closed implicitly; two vertices are a wall without thickness.
     pub obstacles: Vec<Vec<[f64; 2]>>,
     /// Obstacle points, as a range sensor sees them (an extension of the format).
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub points: Vec<[f64; 2]>,
     /// The rear axle stays in `[xmin, ymin, xmax, ymax]`.
-    #[serde(default)]
     pub bounds: Option<[f64; 4]>,
 }
 
@@ -116,6 +117,9 @@ impl Scene {
     /// Largest straight distance between start and goal, metres: paths are sampled and
     /// checked every few centimetres.
     pub const MAX_DISTANCE: f64 = 1e4;
+
+    /// The most [`Scene::goals`]: each may take a search of its own.
+    pub const MAX_GOALS: usize = 256;
 
     /// Longest name as part of a file name, bytes: leaves room for `.METHOD.json`.
     pub const MAX_NAME: usize = 200;
@@ -255,8 +259,12 @@ impl Scene {
             let message = format!("is {}; it must be {}", e.value, e.expected);
             return invalid(format!("vehicle.{}", e.field), message);
         }
-        let poses = [("start", self.start), ("goal", self.goal)];
-        for (field, pose) in poses {
+        if self.goals.len() > Self::MAX_GOALS {
+            let (given, most) = (self.goals.len(), Self::MAX_GOALS);
+            let message = format!("has {given} poses; expected at most {most}");
+            return invalid("goals".to_owned(), message);
+        }
+        for (field, pose) in self.poses() {
             let heading = match pose.heading.abs() {
                 h if h <= Self::MAX_HEADING => None,
                 h if h.is_finite() => Some("has too large a heading; expected at most 1e7 rad"),
@@ -265,16 +273,25 @@ impl Scene {
             // Their distance has a limit of its own, below.
             if let Some(message) = fault(&[pose.x, pose.y], f64::INFINITY).or(heading) {
                 let values = <[f64; 3]>::from(pose);
-                return invalid(field.to_owned(), format!("= {values:?} {message}"));
+                return invalid(field, format!("= {values:?} {message}"));
             }
         }
-        let distance = self.start.distance(self.goal);
-        if distance > Self::MAX_DISTANCE {
-            let message = format!(
-                "lies {distance:.0} m from the goal; expected at most {} m",
-                Self::MAX_DISTANCE
-            );
-            return invalid("start".to_owned(), message);
+        for (field, goal) in self.poses().skip(1) {
+            let distance = self.start.distance(goal);
+            if distance > Self::MAX_DISTANCE {
+                let what = if field == "goal" { "the goal" } else { &field };
+                let most = Self::MAX_DISTANCE;
+                let message =
+                    format!("lies {distance:.0} m from {what}; expected at most {most} m");
+                return invalid("start".to_owned(), message);
+            }
+        }
+        if self.goals.first().is_some_and(|&first| first != self.goal) {
+            let message = "does not begin with the scene's goal; expected that first".to_owned();
+            return invalid("goals".to_owned(), message);
+        }
+        if let Some(tolerance) = self.goal_tolerance {
+            tolerance.validate()?;
         }
         for (i, polygon) in self.obstacles.iter().enumerate() {
             for (j, vertex) in polygon.iter().enumerate() {
@@ -307,16 +324,23 @@ impl Scene {
         Ok(())
     }
 
+    /// Start and goals, each with its field.
+    fn poses(&self) -> impl Iterator<Item = (String, Pose)> + '_ {
+        let goals = self.all_goals().iter().enumerate();
+        let goals = goals.map(|(i, &goal)| (self.goal_field(i), goal));
+        std::iter::once(("start".to_owned(), self.start)).chain(goals)
+    }
+
     /// A warning where headings look like degrees: no scene needs whole turns, and no heading in
     /// radians is a whole or half number by chance.
     fn degrees(&self) -> Option<String> {
-        let poses = [("start", self.start.heading), ("goal", self.goal.heading)];
         let is_suspect = |h: f64| {
             let halves = 2.0 * h;
             h.abs() > TAU * 1.0001 && (halves - halves.round()).abs() < 1e-6
         };
-        let suspects = poses.iter().filter(|(_, h)| is_suspect(*h));
-        let told: Vec<String> = suspects.map(|(field, h)| format!("{field} is {h}")).collect();
+        let suspects = self.poses().filter(|(_, pose)| is_suspect(pose.heading));
+        let told: Vec<String> =
+            suspects.map(|(field, pose)| format!("{field} is {}", pose.heading)).collect();
         let what = told.join(", that of ");
         (!told.is_empty()).then(|| {
             format!("the heading of {what}; headings are taken as radians (90° is 1.5708)")
@@ -388,99 +412,4 @@ impl FileKind {
 /// The file's name without folder and extension.
 pub(super) fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
-}
-
-/// The key whose value a syntax error lies in, as far as the text tells.
-fn key_before<'a>(text: &'a str, error: &serde_json::Error) -> Option<&'a str> {
-    let before: usize =
-        text.split_inclusive('\n').take(error.line().saturating_sub(1)).map(str::len).sum();
-    let head = text.get(..before + error.column().saturating_sub(1))?;
-    let head = &head[..head.rfind("\":")?];
-    Some(&head[head.rfind('"')? + 1..])
-}
-
-fn parse_json(text: &str, path: &Path) -> Result<Scene, SceneError> {
-    let error = match serde_json::from_str(text) {
-        Ok(scene) => return Ok(scene),
-        Err(error) => error,
-    };
-    // The slow way, only for a message that names the field: first the syntax alone,
-    // then the shapes, then what serde says.
-    let message = match serde_json::from_str::<Value>(text) {
-        Err(syntax) => match (word_at(text, &syntax), syntax.classify()) {
-            (Some(word), _) => format!(
-                "{}{word} at line {} column {} is not a number; every value must be finite",
-                key_before(text, &syntax).map_or(String::new(), |key| format!("{key}: ")),
-                syntax.line(),
-                syntax.column()
-            ),
-            (None, Category::Eof) => format!("is cut short: {syntax}"),
-            (None, _) => format!("is not valid JSON: {syntax}"),
-        },
-        Ok(value) => match misshapen(&value) {
-            Some((field, message)) => {
-                return Err(SceneError::Invalid { path: path.to_owned(), field, message });
-            }
-            None => format!("is not a scene: {error}"),
-        },
-    };
-    Err(SceneError::Format { path: path.to_owned(), message })
-}
-
-/// The `NaN` or `Infinity` that a JSON syntax error stopped at.
-fn word_at<'a>(text: &'a str, error: &serde_json::Error) -> Option<&'a str> {
-    let line = text.lines().nth(error.line().checked_sub(1)?)?;
-    let belongs = |c: char| c.is_ascii_alphabetic() || c == '-' || c == '+';
-    let mut from = 0;
-    line.split(|c| !belongs(c)).find(|word| {
-        let range = from..=from + word.len() + 1;
-        from += word.len() + 1;
-        let name = word.trim_start_matches(['-', '+']).to_ascii_lowercase();
-        range.contains(&error.column()) && ["nan", "inf", "infinity"].contains(&name.as_str())
-    })
-}
-
-/// The first geometric field that is not the numbers it should be.
-fn misshapen(scene: &Value) -> Option<(String, String)> {
-    let list = |field: &str| {
-        let items = scene.get(field).and_then(Value::as_array);
-        items.into_iter().flatten().enumerate()
-    };
-    let pose = |field: &str| not_numbers(scene.get(field)?, 3, field.to_owned());
-    let bounds = scene.get("bounds").filter(|b| !b.is_null());
-    pose("start")
-        .or_else(|| pose("goal"))
-        .or_else(|| not_numbers(bounds?, 4, "bounds".to_owned()))
-        .or_else(|| {
-            list("points").find_map(|(i, point)| not_numbers(point, 2, format!("points[{i}]")))
-        })
-        .or_else(|| {
-            list("obstacles").find_map(|(i, polygon)| {
-                let Some(vertices) = polygon.as_array() else {
-                    let message = format!("is {}; expected a list of [x, y]", brief(polygon));
-                    return Some((format!("obstacles[{i}]"), message));
-                };
-                let field = |j| format!("obstacles[{i}][{j}]");
-                vertices.iter().enumerate().find_map(|(j, v)| not_numbers(v, 2, field(j)))
-            })
-        })
-}
-
-/// What is wrong with `value`, where `count` numbers are expected.
-fn not_numbers(value: &Value, count: usize, field: String) -> Option<(String, String)> {
-    let numbers = value.as_array().is_some_and(|v| v.iter().all(Value::is_number));
-    let length = value.as_array().map_or(0, Vec::len);
-    if numbers && length == count {
-        return None;
-    }
-    Some((field, format!("is {}; expected {count} finite numbers", brief(value))))
-}
-
-/// The value as JSON, cut to a readable length.
-fn brief(value: &Value) -> String {
-    let json = value.to_string();
-    match json.char_indices().nth(60) {
-        Some((end, _)) => format!("{}…", &json[..end]),
-        None => json,
-    }
 }

@@ -258,6 +258,8 @@ mod tests {
             vehicle: Vehicle::default(),
             start,
             goal,
+            goals: Vec::new(),
+            goal_tolerance: None,
             parking_type: Some(kind),
             obstacles: vec![],
             points: vec![],

@@ -9,29 +9,27 @@
 //! it contains the footprint's centre; this needs no decomposition and holds for any
 //! simple polygon. Footprints are tested shrunk by [`PENETRATION_TOL`].
 
+mod body;
+mod contact;
+
 use std::f64::consts::TAU;
 
-use parry2d_f64::math::{Pose2, Vector2};
-use parry2d_f64::query::{self, PointQuery};
-use parry2d_f64::shape::{Cuboid, Segment};
-use parry2d_f64::transformation::convex_polygons_intersection_points;
+use parry2d_f64::math::Vector2;
 use parry2d_f64::utils::point_in_poly2d;
 
+use self::body::{Body, Extent, Solid, State};
+use self::contact::Contacts;
 use crate::episode::Judge;
 use crate::geometry::Pose;
 use crate::output::PathFile;
 use crate::vehicle::Vehicle;
-use crate::world::Scene;
+use crate::world::{GoalTolerance, Scene};
 
 /// The independent check of every row.
 pub const JUDGE: Judge = Judge { verdict: "ok", check: judge };
 
-fn judge(scene: &Scene, path: &PathFile, share: Option<f64>) -> Result<f64, String> {
-    let checked = match share {
-        None => check(scene, path),
-        Some(share) => check_cover(scene, path, share),
-    };
-    checked.map_err(|violation| violation.to_string())
+fn judge(scene: &Scene, path: &PathFile, share: Option<f64>, contact: f64) -> Result<f64, String> {
+    check_allowing(scene, path, share, contact).map_err(|violation| violation.to_string())
 }
 
 /// Footprints are tested at most this far apart along the path, metres; no corner moves more
@@ -157,160 +155,25 @@ pub enum Violation {
 /// Checks a path file against its scene. Returns the smallest distance between footprint
 /// and obstacles, metres (infinite without obstacles, 0 on contact).
 pub fn check(scene: &Scene, path: &PathFile) -> Result<f64, Violation> {
-    Oracle::new(scene).check(path, None)
+    check_allowing(scene, path, None, 0.0)
 }
 
 /// [`check`] for a path that need not end at the goal, but where at least `share` of the parked
 /// footprint is covered.
 pub fn check_cover(scene: &Scene, path: &PathFile, share: f64) -> Result<f64, Violation> {
-    Oracle::new(scene).check(path, Some(share))
+    check_allowing(scene, path, Some(share), 0.0)
 }
 
-/// A rear-axle pose in local coordinates.
-#[derive(Clone, Copy)]
-struct State {
-    position: Vector2,
-    heading: f64,
-}
-
-impl State {
-    /// After the signed arc length `s` at `curvature`: the chord of the arc, at the
-    /// mean heading.
-    fn driven(self, curvature: f64, s: f64) -> State {
-        let turn = curvature * s;
-        let half = turn / 2.0;
-        let chord = if half.abs() < 1e-8 { s } else { s * half.sin() / half };
-        let (sin, cos) = (self.heading + half).sin_cos();
-        State {
-            position: self.position + Vector2::new(cos, sin) * chord,
-            heading: self.heading + turn,
-        }
-    }
-
-    /// Distance and difference of heading, both ≥ 0.
-    fn apart(self, other: State) -> (f64, f64) {
-        let turn = self.heading - other.heading;
-        ((self.position - other.position).length(), (turn - TAU * (turn / TAU).round()).abs())
-    }
-}
-
-/// An axis-aligned box.
-#[derive(Clone, Copy)]
-struct Extent {
-    min: Vector2,
-    max: Vector2,
-}
-
-impl Extent {
-    fn around(points: &[Vector2]) -> Self {
-        let start = Self { min: Vector2::INFINITY, max: Vector2::NEG_INFINITY };
-        points.iter().fold(start, |e, &p| Self { min: e.min.min(p), max: e.max.max(p) })
-    }
-
-    /// Distance between the boxes; 0 where they overlap.
-    fn gap(&self, other: &Extent) -> f64 {
-        (self.min - other.max).max(other.min - self.max).max(Vector2::ZERO).length()
-    }
-}
-
-/// A solid polygon with its edges.
-struct Solid {
-    vertices: Vec<Vector2>,
-    extent: Extent,
-    edges: Vec<(Segment, Extent)>,
-}
-
-impl Solid {
-    fn new(vertices: Vec<Vector2>) -> Self {
-        let next = vertices.iter().cycle().skip(1);
-        let edges = vertices.iter().zip(next);
-        Self {
-            extent: Extent::around(&vertices),
-            edges: edges.map(|(&a, &b)| (Segment::new(a, b), Extent::around(&[a, b]))).collect(),
-            vertices,
-        }
-    }
-}
-
-/// The footprint at one pose.
-struct Body {
-    pose: Pose2,
-    half: Vector2,
-    extent: Extent,
-}
-
-impl Body {
-    fn new(vehicle: &Vehicle, at: State) -> Self {
-        let (sin, cos) = at.heading.sin_cos();
-        let offset = vehicle.length / 2.0 - vehicle.rear_overhang;
-        let center = at.position + Vector2::new(cos, sin) * offset;
-        let half = Vector2::new(vehicle.length, vehicle.width) / 2.0;
-        let (sin, cos) = (sin.abs(), cos.abs());
-        let reach = Vector2::new(cos * half.x + sin * half.y, sin * half.x + cos * half.y);
-        let extent = Extent { min: center - reach, max: center + reach };
-        Self { pose: Pose2::new(center, at.heading), half, extent }
-    }
-
-    fn center(&self) -> Vector2 {
-        self.pose.translation
-    }
-
-    /// Share of the footprint that `other`, of the same vehicle, covers.
-    fn covered_by(&self, other: &Body) -> f64 {
-        let corners = |body: &Body| {
-            let Vector2 { x, y } = body.half;
-            let signs = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-            signs.map(|(i, j)| body.pose * Vector2::new(i * x, j * y))
-        };
-        let mut common = Vec::new();
-        convex_polygons_intersection_points(&corners(self), &corners(other), &mut common);
-        let next = common.iter().cycle().skip(1);
-        let twice: f64 = common.iter().zip(next).map(|(a, b)| a.perp_dot(*b)).sum();
-        twice.abs() / 2.0 / (4.0 * self.half.x * self.half.y)
-    }
-
-    /// The rectangle, smaller by `margin` metres on every side.
-    fn shrunk(&self, margin: f64) -> Cuboid {
-        Cuboid::new((self.half - Vector2::splat(margin)).max(Vector2::splat(1e-9)))
-    }
-
-    fn distance_to_edge(&self, edge: &Segment) -> f64 {
-        query::distance(&self.pose, &self.shrunk(0.0), &Pose2::IDENTITY, edge)
-            .expect("parry measures boxes and segments")
-            .distance
-    }
-
-    fn distance_to_point(&self, point: Vector2) -> f64 {
-        self.shrunk(0.0).distance_to_point(&self.pose, point, true)
-    }
-
-    fn touches_edge(&self, edge: &Segment, margin: f64) -> bool {
-        query::intersection_test(&self.pose, &self.shrunk(margin), &Pose2::IDENTITY, edge)
-            .expect("parry intersects boxes and segments")
-            .intersecting
-    }
-
-    fn touches_point(&self, point: Vector2, margin: f64) -> bool {
-        self.shrunk(margin).contains_point(&self.pose, point)
-    }
-
-    /// How deep something reaches in, millimetres: the shrinking that frees the
-    /// footprint of it. `None` within [`PENETRATION_TOL`].
-    fn depth_mm(&self, touches: impl Fn(f64) -> bool) -> Option<f64> {
-        if !touches(PENETRATION_TOL) {
-            return None;
-        }
-        let (mut touching, mut free) = (PENETRATION_TOL, self.half.x.min(self.half.y));
-        while free - touching > 1e-5 {
-            let middle = (touching + free) / 2.0;
-            if touches(middle) {
-                touching = middle;
-            } else {
-                free = middle;
-            }
-        }
-        Some(touching * 1e3)
-    }
+/// [`check`], or [`check_cover`] with a `share`, of a path that may begin and end up to
+/// `contact_m` metres deep in obstacles: each is only left from the start on, and only entered
+/// towards the end.
+pub fn check_allowing(
+    scene: &Scene,
+    path: &PathFile,
+    share: Option<f64>,
+    contact_m: f64,
+) -> Result<f64, Violation> {
+    Oracle::new(scene).check(path, share, contact_m)
 }
 
 /// A scene made ready, in coordinates relative to its start: scenes may lie anywhere.
@@ -320,7 +183,8 @@ struct Oracle {
     rounding: f64,
     vehicle: Vehicle,
     start: State,
-    goal: State,
+    goals: Vec<State>,
+    tolerance: GoalTolerance,
     bounds: Option<Extent>,
     solids: Vec<Solid>,
     points: Vec<Vector2>,
@@ -332,12 +196,16 @@ impl Oracle {
         let local = |x: f64, y: f64| Vector2::new(x, y) - origin;
         let locals = |v: &[[f64; 2]]| v.iter().map(|&[x, y]| local(x, y)).collect::<Vec<_>>();
         let state = |p: Pose| State { position: local(p.x, p.y), heading: p.heading };
+        let goals = scene.all_goals();
+        let resolutions = goals.iter().map(|goal| goal.resolution());
+        let resolution = resolutions.fold(scene.start.resolution(), f64::max);
         Self {
             origin,
-            rounding: ROUNDING_STEPS * scene.start.resolution().max(scene.goal.resolution()),
+            rounding: ROUNDING_STEPS * resolution,
             vehicle: scene.vehicle,
             start: state(scene.start),
-            goal: state(scene.goal),
+            goals: goals.iter().map(|&goal| state(goal)).collect(),
+            tolerance: scene.goal_tolerance.unwrap_or_default(),
             bounds: scene
                 .bounds
                 .map(|[x0, y0, x1, y1]| Extent { min: local(x0, y0), max: local(x1, y1) }),
@@ -346,7 +214,7 @@ impl Oracle {
         }
     }
 
-    fn check(&self, path: &PathFile, share: Option<f64>) -> Result<f64, Violation> {
+    fn check(&self, path: &PathFile, share: Option<f64>, contact_m: f64) -> Result<f64, Violation> {
         let n = path.poses.len();
         if n == 0 || path.gears.len() != n || path.steer.len() != n {
             return Err(Violation::Shape {
@@ -372,16 +240,18 @@ impl Oracle {
         self.end(state(n - 1), share)?;
         let step = CHECK_STEP * (self.vehicle.length / CHECK_LENGTH).min(1.0);
         let mut clearance = f64::INFINITY;
+        let mut contacts = Contacts::new(contact_m);
         for i in 0..n - 1 {
             let (curvature, s) =
                 self.motion(i, state(i), state(i + 1), path.gears[i], path.steer[i])?;
             let steps = (self.corner_motion(curvature, s) / step).ceil().max(1.0) as usize;
             for k in 0..steps {
                 let at = state(i).driven(curvature, s * k as f64 / steps as f64);
-                self.footprint(i, at, &mut clearance)?;
+                self.footprint(i, at, &mut clearance, &mut contacts)?;
             }
         }
-        self.footprint(n - 1, state(n - 1), &mut clearance)?;
+        self.footprint(n - 1, state(n - 1), &mut clearance, &mut contacts)?;
+        contacts.check()?;
         Ok(clearance)
     }
 
@@ -392,15 +262,26 @@ impl Oracle {
         s.abs() * 0.5_f64.mul_add(curvature.abs() * reach, 0.5).max(1.0)
     }
 
-    /// Whether `end` is the goal, or covers a `share` of the parked footprint.
+    /// Whether `end` is a goal, give or take the tolerance, or covers a `share` of its footprint.
     fn end(&self, end: State, share: Option<f64>) -> Result<(), Violation> {
         let Some(share) = share else {
-            let (metres, rad) = end.apart(self.goal);
-            let at_goal = metres <= END_TOL + self.rounding && rad <= END_TOL;
-            return at_goal.then_some(()).ok_or(Violation::Goal { mm: metres * 1e3, rad });
+            let GoalTolerance { position_m, heading_rad } = self.tolerance;
+            let mut nearest = (f64::INFINITY, 0.0);
+            for goal in &self.goals {
+                let (metres, rad) = end.apart(*goal);
+                if metres <= position_m + END_TOL + self.rounding && rad <= heading_rad + END_TOL {
+                    return Ok(());
+                }
+                if metres < nearest.0 {
+                    nearest = (metres, rad);
+                }
+            }
+            let (metres, rad) = nearest;
+            return Err(Violation::Goal { mm: metres * 1e3, rad });
         };
         let body = |state| Body::new(&self.vehicle, state);
-        let covered = body(self.goal).covered_by(&body(end));
+        let covered = self.goals.iter().map(|&goal| body(goal).covered_by(&body(end)));
+        let covered = covered.fold(0.0, f64::max);
         if covered >= share - 1e-9 { Ok(()) } else { Err(Violation::Cover { covered, share }) }
     }
 
@@ -443,7 +324,14 @@ impl Oracle {
     }
 
     /// Tests one footprint, and lowers `clearance` to its distance from the obstacles.
-    fn footprint(&self, pose: usize, at: State, clearance: &mut f64) -> Result<(), Violation> {
+    fn footprint(
+        &self,
+        pose: usize,
+        at: State,
+        clearance: &mut f64,
+        contacts: &mut Contacts,
+    ) -> Result<(), Violation> {
+        contacts.next();
         if let Some(Extent { min, max }) = self.bounds {
             let out = (min - at.position).max(at.position - max).max_element();
             if out > END_TOL + self.rounding {
@@ -451,7 +339,7 @@ impl Oracle {
             }
         }
         let body = Body::new(&self.vehicle, at);
-        let collision = |mm, obstacle| Err(Violation::Collision { pose, mm, obstacle });
+        let mut collision = |mm, obstacle| contacts.met(pose, mm, obstacle);
         // Whatever is farther than the nearest so far can neither touch nor lower it.
         let far = |extent: &Extent, nearest: f64| {
             let gap = extent.gap(&body.extent);
@@ -462,7 +350,7 @@ impl Oracle {
                 continue;
             }
             if point_in_poly2d(body.center(), &solid.vertices) {
-                return collision(body.half.min_element() * 1e3, format!("polygon {i}"));
+                collision(body.half.min_element() * 1e3, format!("polygon {i}"))?;
             }
             for (edge, extent) in &solid.edges {
                 if far(extent, *clearance) {
@@ -472,7 +360,7 @@ impl Oracle {
                 if *clearance <= 0.0
                     && let Some(mm) = body.depth_mm(|margin| body.touches_edge(edge, margin))
                 {
-                    return collision(mm, format!("polygon {i}"));
+                    collision(mm, format!("polygon {i}"))?;
                 }
             }
         }
@@ -484,7 +372,7 @@ impl Oracle {
             if *clearance <= 0.0
                 && let Some(mm) = body.depth_mm(|margin| body.touches_point(point, margin))
             {
-                return collision(mm, format!("point {i}"));
+                collision(mm, format!("point {i}"))?;
             }
         }
         Ok(())

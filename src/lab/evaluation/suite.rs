@@ -9,7 +9,8 @@ use super::oracle;
 use crate::episode::{self, Case, Episode, EpisodeConfig, Row};
 use crate::n3p::{Method, MethodError, MethodSettings};
 use crate::n3p::{Models, ModelsError};
-use crate::planners::{Budget, Planner, Problem, ProblemError};
+use crate::planners::goals::{self, Terms};
+use crate::planners::{Budget, Planner, ProblemError};
 use crate::vehicle::Vehicle;
 use crate::world::generate::{GeneratorConfig, GeneratorError, generate};
 use crate::world::scene::SceneError;
@@ -25,8 +26,10 @@ pub struct SuiteConfig {
     /// Budget of an episode.
     pub budget: Budget,
     /// Clearance that plans keep where start and goal allow it, metres, 0 to 1: see
-    /// [`Problem::with_margin`].
+    /// [`crate::planners::Problem::with_margin`].
     pub margin_m: f64,
+    /// How deep start and goal may reach into obstacles, metres: see [`crate::planners::Problem::allowing_contact`].
+    pub allow_contact_m: f64,
     /// Worker threads. More than one disturbs the times, never the results.
     pub threads: usize,
 }
@@ -111,12 +114,12 @@ impl Folder {
 }
 
 /// The scenes of a folder, of one parking type if `kind` is given. Files that hold no scene, or one
-/// whose start or goal is not free with `margin_m`, are left out and named. Where that leaves
+/// whose start or goal is not free on these `terms`, are left out and named. Where that leaves
 /// nothing, or there is nothing, it is an error.
 pub fn from_folder(
     dir: &Path,
     kind: Option<ParkingType>,
-    margin_m: f64,
+    terms: Terms,
 ) -> Result<Folder, SuiteError> {
     let read = Scene::read_each(dir)?;
     let mut folder = Folder { cases: Vec::new(), unusable: Vec::new(), files: read.len() };
@@ -129,7 +132,7 @@ pub fn from_folder(
                 continue;
             }
         };
-        match Problem::with_margin(&scene, margin_m) {
+        match goals::first_problem(&scene, terms) {
             Ok(_) => folder.cases.push(Case { kind: scene.parking_type, level: None, scene }),
             Err(error) => {
                 let scene = format!("{} ({})", scene.name, path.display());
@@ -174,13 +177,18 @@ pub fn check(cases: &[Case], models: &Models, config: &SuiteConfig) -> Result<()
                 models.check_kind(method, &scene.vehicle, kind)?;
             }
         }
-        Problem::with_margin(scene, config.margin_m)
+        goals::first_problem(scene, config.terms())
             .map_err(|error| SuiteError::Unsolvable { scene: scene.name.clone(), error })?;
     }
     Ok(())
 }
 
 impl SuiteConfig {
+    /// What plans keep to.
+    pub fn terms(&self) -> Terms {
+        Terms { margin: self.margin_m, contact: self.allow_contact_m }
+    }
+
     /// The planners of all methods, in their order.
     pub fn build_all(&self, models: &Models) -> Result<Vec<Box<dyn Planner + Send>>, MethodError> {
         self.methods.iter().map(|m| m.build(models, &self.settings)).collect()
@@ -216,7 +224,8 @@ where
             let (send, next) = (send.clone(), &next);
             scope.spawn(move || {
                 let usual = EpisodeConfig::new(config.budget);
-                let episodes = EpisodeConfig { margin_m: config.margin_m, ..usual };
+                let Terms { margin: margin_m, contact: allow_contact_m } = config.terms();
+                let episodes = EpisodeConfig { margin_m, allow_contact_m, ..usual };
                 loop {
                     let job = next.fetch_add(1, Ordering::Relaxed);
                     if job >= total {

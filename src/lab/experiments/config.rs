@@ -151,6 +151,7 @@ impl EvaluateConfig {
             settings: MethodSettings { planner: self.planner, n3p: self.n3p, rl: self.rl },
             budget: self.budget(),
             margin_m: Problem::MARGIN,
+            allow_contact_m: 0.0,
             threads: 1,
         }
     }

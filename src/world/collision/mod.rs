@@ -28,10 +28,11 @@ pub struct CollisionWorld {
     index: EdgeIndex,
     bounds: Option<ConvexBounds>,
     footprint: Aabb,
-    tolerated: Option<Tolerated>,
+    tolerated: Vec<Tolerated>,
 }
 
-/// Obstacles that a smaller footprint must keep clear of: those next to a start or a goal.
+/// Obstacles that a smaller footprint must keep clear of: those next to a start or a goal, or
+/// touched there.
 #[derive(Clone, Debug)]
 struct Tolerated {
     index: EdgeIndex,
@@ -53,15 +54,16 @@ impl CollisionWorld {
             index: EdgeIndex::new(obstacles),
             bounds: bounds.map(ConvexBounds::new),
             footprint: vehicle.footprint(margin),
-            tolerated: None,
+            tolerated: Vec::new(),
         }
     }
 
     /// The same world with more obstacles, from which only `margin` metres are kept, no more than
-    /// from the others.
-    pub fn tolerating(self, obstacles: &Obstacles, vehicle: &Vehicle, margin: f64) -> Self {
+    /// from the others; of a negative margin the car may reach so deep into them.
+    pub fn tolerating(mut self, obstacles: &Obstacles, vehicle: &Vehicle, margin: f64) -> Self {
         let (index, footprint) = (EdgeIndex::new(obstacles), vehicle.footprint(margin));
-        Self { tolerated: Some(Tolerated { index, footprint }), ..self }
+        self.tolerated.push(Tolerated { index, footprint });
+        self
     }
 
     /// The footprint (margin included) in the vehicle's frame.
@@ -76,12 +78,10 @@ impl CollisionWorld {
 
     /// Calls `visit` with every edge that may come near `area`; points are edges of length zero.
     pub fn edges_near(&self, area: &Aabb, mut visit: impl FnMut(Vec2, Vec2)) {
-        for index in [Some(&self.index), self.tolerated.as_ref().map(|t| &t.index)] {
-            index.and_then(|index| {
-                index.first_near(area, |a, b| {
-                    visit(a, b);
-                    false
-                })
+        for index in std::iter::once(&self.index).chain(self.tolerated.iter().map(|t| &t.index)) {
+            index.first_near(area, |a, b| {
+                visit(a, b);
+                false
             });
         }
     }
@@ -93,7 +93,7 @@ impl CollisionWorld {
             return false;
         }
         is_clear(&self.index, &self.footprint, pose)
-            && self.tolerated.as_ref().is_none_or(|t| is_clear(&t.index, &t.footprint, pose))
+            && self.tolerated.iter().all(|t| is_clear(&t.index, &t.footprint, pose))
     }
 
     /// Whether another footprint than this world's touches nothing at `pose`; neither the bounds
@@ -120,7 +120,7 @@ impl CollisionWorld {
 
     /// Whether the motion of `sweep` touches nothing of what is tolerated.
     fn tolerates(&self, start: &BodyFrame, sweep: &Sweep) -> bool {
-        self.tolerated.as_ref().is_none_or(|t| {
+        self.tolerated.iter().all(|t| {
             let sweep = Sweep::new(&t.footprint, sweep.segment());
             let near = start.aabb_of(sweep.aabb());
             let hit = |a, b| sweep.hits(start.local(a), start.local(b));

@@ -1,0 +1,421 @@
+//! The planner to embed: made once for a vehicle, asked as often as one likes.
+
+use std::num::NonZero;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+
+use crate::curves::trajectory::LimitError;
+use crate::curves::{Path, TrajectoryLimits};
+use crate::geometry::{Frame, Pose};
+use crate::n3p::{Method, MethodError, MethodSettings, Models, ModelsError};
+use crate::output::{Driven, PathFile};
+use crate::planners::goals::{self, Terms};
+use crate::planners::{Budget, NoPath, Planner, ProblemError, Route};
+use crate::vehicle::{Vehicle, VehicleError};
+use crate::world::{GoalTolerance, ParkingType, Scene};
+
+/// Plans for one vehicle. Shared between threads by reference: each call borrows a planner of its
+/// own, and what one call leaves behind never changes the result of another.
+///
+/// ```
+/// use n3p::{Lot, Parker, Vehicle};
+/// use n3p::curves::TrajectoryLimits;
+/// use n3p::geometry::Pose;
+///
+/// let parker = Parker::new(Vehicle::default())?;
+/// // Two parked cars, a bay between them, and the kerb across the lane. Metres and radians; a pose
+/// // is that of the rear-axle centre.
+/// let mut lot = Lot::new();
+/// lot.polygon([[-4.1, -2.6], [-1.6, -2.6], [-1.6, 2.4], [-4.1, 2.4]]);
+/// lot.polygon([[1.6, -2.6], [4.1, -2.6], [4.1, 2.4], [1.6, 2.4]]);
+/// lot.polyline([[-15.0, 9.5], [15.0, 9.5]]);
+/// let start = Pose::new(-9.0, 6.0, 0.0);
+/// let goal = Pose::new(0.0, -1.4, std::f64::consts::FRAC_PI_2);
+/// let plan = parker.plan(start, goal, &lot)?;
+/// assert!(plan.length() < 30.0);
+/// let driven = plan.trajectory(&TrajectoryLimits::default())?;
+/// assert!(driven.moments.last().unwrap().speed == 0.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Parker {
+    vehicle: Vehicle,
+    method: Method,
+    models: Models,
+    settings: MethodSettings,
+    terms: Terms,
+    budget: Budget,
+    /// Planners that nobody uses just now.
+    idle: Mutex<Vec<Box<dyn Planner + Send>>>,
+}
+
+/// A parker that cannot be had.
+#[derive(Debug, thiserror::Error)]
+pub enum ParkerError {
+    /// The vehicle is none.
+    #[error("vehicle: {0}")]
+    Vehicle(#[from] VehicleError),
+    /// A model cannot be used, or none serves the vehicle.
+    #[error(transparent)]
+    Models(#[from] ModelsError),
+    /// The method cannot be built.
+    #[error(transparent)]
+    Method(#[from] MethodError),
+    /// A margin or a contact beyond what can be asked for.
+    #[error("{0}")]
+    Terms(ProblemError),
+}
+
+/// Why there is no plan.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PlanError {
+    /// What was asked is no problem: a number that is none, a start or a goal that is not free.
+    #[error("{0}")]
+    Problem(ProblemError),
+    /// A scene has another vehicle than the parker.
+    #[error("the scene's vehicle is not the one that this parker was made for; make one for it")]
+    OtherVehicle,
+    /// There is no path, or none was found within the budget.
+    #[error("no path: {0}")]
+    NoPath(NoPath),
+}
+
+impl Parker {
+    /// Plans for `vehicle` by `n3p` with the models compiled in (feature `models`), and by the search
+    /// of `ha-rs` where there are none.
+    pub fn new(vehicle: Vehicle) -> Result<Self, ParkerError> {
+        Self::with_models(vehicle, Models::compiled_in(&vehicle)?)
+    }
+
+    /// The same with models of your own, such as [`Models::load`] reads from files.
+    pub fn with_models(vehicle: Vehicle, models: Models) -> Result<Self, ParkerError> {
+        let serves = models.selector(Method::N3P, &vehicle).is_some();
+        Self::by(if serves { Method::N3P } else { Method::HA_RS }, vehicle, models)
+    }
+
+    /// The same by any method.
+    pub fn by(method: Method, vehicle: Vehicle, models: Models) -> Result<Self, ParkerError> {
+        vehicle.validate()?;
+        models.check_vehicle(method, "of the parker", &vehicle)?;
+        let settings = MethodSettings::default();
+        let planner = method.build(&models, &settings)?;
+        let (terms, budget, idle) =
+            (Terms::default(), Budget::default(), Mutex::new(vec![planner]));
+        Ok(Self { vehicle, method, models, settings, terms, budget, idle })
+    }
+
+    /// The same keeping `metres` from obstacles where start and goal allow it, 0 to
+    /// [`Problem::MAX_MARGIN`](crate::planners::Problem::MAX_MARGIN).
+    pub fn margin(self, metres: f64) -> Result<Self, ParkerError> {
+        Self { terms: Terms { margin: metres, ..self.terms }, ..self }.checked()
+    }
+
+    /// The same also from starts and to goals that reach up to `metres` into an obstacle.
+    pub fn allow_contact(self, metres: f64) -> Result<Self, ParkerError> {
+        Self { terms: Terms { contact: metres, ..self.terms }, ..self }.checked()
+    }
+
+    fn checked(self) -> Result<Self, ParkerError> {
+        self.terms.check().map_err(ParkerError::Terms)?;
+        Ok(self)
+    }
+
+    /// The same with another budget of work.
+    pub fn budget(self, budget: Budget) -> Self {
+        Self { budget, ..self }
+    }
+
+    /// The vehicle planned for.
+    pub fn vehicle(&self) -> &Vehicle {
+        &self.vehicle
+    }
+
+    /// The method planned by.
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
+    /// The path from `start` to `goal` among what stands in `lot`.
+    pub fn plan(&self, start: Pose, goal: Pose, lot: &Lot) -> Result<Plan, PlanError> {
+        self.plan_request(&Request::new(start, goal), lot)
+    }
+
+    /// The path for a request, which may have several goals, a tolerance and a hint.
+    pub fn plan_request(&self, request: &Request, lot: &Lot) -> Result<Plan, PlanError> {
+        self.plan_scene(&lot.scene(self.vehicle, request))
+    }
+
+    /// The path for a scene, whose vehicle must be the one planned for.
+    pub fn plan_scene(&self, scene: &Scene) -> Result<Plan, PlanError> {
+        if scene.vehicle != self.vehicle {
+            return Err(PlanError::OtherVehicle);
+        }
+        let mut planner = self.borrow();
+        let planned = self.plan_by(planner.as_mut(), scene);
+        self.idle.lock().unwrap_or_else(|e| e.into_inner()).push(planner);
+        planned
+    }
+
+    /// A plan for each request, by all cores; the same as one by one.
+    pub fn plan_batch(&self, requests: &[(Request, &Lot)]) -> Vec<Result<Plan, PlanError>> {
+        self.batch(requests.len(), |i| requests[i].1.scene(self.vehicle, &requests[i].0))
+    }
+
+    /// A plan for each scene, by all cores; the same as one by one.
+    pub fn plan_scenes(&self, scenes: &[Scene]) -> Vec<Result<Plan, PlanError>> {
+        self.batch(scenes.len(), |i| scenes[i].clone())
+    }
+
+    fn batch(
+        &self,
+        count: usize,
+        scene: impl Fn(usize) -> Scene + Sync,
+    ) -> Vec<Result<Plan, PlanError>> {
+        let cores = thread::available_parallelism().map_or(1, NonZero::get);
+        let next = AtomicUsize::new(0);
+        let work = || {
+            let mut done = Vec::new();
+            loop {
+                let i = next.fetch_add(1, Ordering::Relaxed);
+                if i >= count {
+                    return done;
+                }
+                done.push((i, self.plan_scene(&scene(i))));
+            }
+        };
+        let mut plans = thread::scope(|scope| {
+            let threads: Vec<_> = (1..cores.min(count)).map(|_| scope.spawn(work)).collect();
+            let mut plans = work();
+            for thread in threads {
+                plans.extend(thread.join().expect("planning does not panic"));
+            }
+            plans
+        });
+        plans.sort_by_key(|(i, _)| *i);
+        plans.into_iter().map(|(_, plan)| plan).collect()
+    }
+
+    /// A planner for one call. Making one costs little beside preparing it, which its first plan does.
+    fn borrow(&self) -> Box<dyn Planner + Send> {
+        let idle = self.idle.lock().unwrap_or_else(|e| e.into_inner()).pop();
+        idle.unwrap_or_else(|| {
+            self.method.build(&self.models, &self.settings).expect("it was built before")
+        })
+    }
+
+    fn plan_by(&self, planner: &mut dyn Planner, scene: &Scene) -> Result<Plan, PlanError> {
+        let planned =
+            goals::plan(planner, scene, self.terms, self.budget).map_err(PlanError::Problem)?;
+        let result = planned.result;
+        let path = result.outcome.map_err(PlanError::NoPath)?;
+        Ok(Plan {
+            vehicle: self.vehicle,
+            start: scene.start,
+            goal: scene.all_goals()[planned.goal_index],
+            goal_index: planned.goal_index,
+            frame: planned.problem.frame,
+            margin: planned.problem.margin,
+            kind: planned.problem.kind,
+            method: self.method,
+            expansions: result.expansions,
+            route: result.guidance.map(|g| g.route),
+            path,
+        })
+    }
+}
+
+/// What is asked of a plan besides avoiding obstacles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Request {
+    /// Rear-axle pose to start from.
+    pub start: Pose,
+    /// Rear-axle poses to park at; the cheapest is taken.
+    pub goals: Vec<Pose>,
+    /// How far from a goal the car may stop.
+    pub tolerance: Option<GoalTolerance>,
+    /// How the goal lies in its spot, where that is known; it is found otherwise.
+    pub parking_type: Option<ParkingType>,
+}
+
+impl Request {
+    /// From `start` exactly to `goal`.
+    pub fn new(start: Pose, goal: Pose) -> Self {
+        Self { start, goals: vec![goal], tolerance: None, parking_type: None }
+    }
+}
+
+/// What stands in a lot, in any frame that start and goal share; metres.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Lot {
+    outlines: Vec<Vec<[f64; 2]>>,
+    points: Vec<[f64; 2]>,
+    bounds: Option<[f64; 4]>,
+}
+
+impl Lot {
+    /// Nothing at all.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a solid simple polygon, closed implicitly; two vertices are a wall.
+    pub fn polygon(&mut self, vertices: impl Into<Vec<[f64; 2]>>) -> &mut Self {
+        self.outlines.push(vertices.into());
+        self
+    }
+
+    /// Adds a line without thickness, such as a kerb or a fence.
+    pub fn polyline(&mut self, vertices: impl AsRef<[[f64; 2]]>) -> &mut Self {
+        self.outlines.extend(vertices.as_ref().windows(2).map(<[_]>::to_vec));
+        self
+    }
+
+    /// Adds points, as a range sensor sees them.
+    pub fn points(&mut self, points: impl IntoIterator<Item = [f64; 2]>) -> &mut Self {
+        self.points.extend(points);
+        self
+    }
+
+    /// Keeps the rear axle within `[xmin, ymin, xmax, ymax]`.
+    pub fn bounds(&mut self, bounds: [f64; 4]) -> &mut Self {
+        self.bounds = Some(bounds);
+        self
+    }
+
+    /// Adds the occupied cells of a grid, as the squares that they are.
+    ///
+    /// `occupied` is row by row, the first row at the lowest y; `origin` is the corner of the first
+    /// cell, and `resolution` the side of a cell. Cells beyond the last whole row are left out.
+    pub fn grid(
+        &mut self,
+        origin: [f64; 2],
+        resolution: f64,
+        columns: usize,
+        occupied: &[bool],
+    ) -> &mut Self {
+        let rows = occupied.len().checked_div(columns).unwrap_or(0);
+        // Runs of a row, grown upward over the rows that have the same run.
+        let mut open: Vec<(usize, usize, usize)> = Vec::new();
+        for y in 0..=rows {
+            let row = if y < rows { &occupied[y * columns..(y + 1) * columns] } else { &[] };
+            let mut runs = Vec::new();
+            let mut x = 0;
+            while x < row.len() {
+                let from = x;
+                while x < row.len() && row[x] == row[from] {
+                    x += 1;
+                }
+                if row[from] {
+                    runs.push((from, x));
+                }
+            }
+            let mut still = Vec::new();
+            for (from, to, since) in open {
+                if runs.contains(&(from, to)) {
+                    still.push((from, to, since));
+                } else {
+                    let at = |x: usize, y: usize| {
+                        [origin[0] + x as f64 * resolution, origin[1] + y as f64 * resolution]
+                    };
+                    self.polygon([at(from, since), at(to, since), at(to, y), at(from, y)]);
+                }
+            }
+            for (from, to) in runs {
+                if !still.iter().any(|&(f, t, _)| (f, t) == (from, to)) {
+                    still.push((from, to, y));
+                }
+            }
+            open = still;
+        }
+        self
+    }
+
+    /// The scene of a request in this lot.
+    fn scene(&self, vehicle: Vehicle, request: &Request) -> Scene {
+        let first = request.goals.first().copied();
+        Scene {
+            name: String::new(),
+            source: String::new(),
+            vehicle,
+            start: request.start,
+            goal: first.unwrap_or(Pose::new(f64::NAN, f64::NAN, f64::NAN)),
+            goals: if request.goals.len() > 1 { request.goals.clone() } else { Vec::new() },
+            goal_tolerance: request.tolerance,
+            parking_type: request.parking_type,
+            obstacles: self.outlines.clone(),
+            points: self.points.clone(),
+            bounds: self.bounds,
+        }
+    }
+}
+
+/// A path that the exact swept check has passed, and how it came about.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    vehicle: Vehicle,
+    start: Pose,
+    goal: Pose,
+    goal_index: usize,
+    frame: Frame,
+    margin: f64,
+    kind: Option<ParkingType>,
+    method: Method,
+    expansions: usize,
+    route: Option<Route>,
+    path: Path,
+}
+
+impl Plan {
+    /// Driven length, metres.
+    pub fn length(&self) -> f64 {
+        self.path.length()
+    }
+
+    /// Changes of gear on the way.
+    pub fn direction_changes(&self) -> usize {
+        self.path.direction_changes()
+    }
+
+    /// The path as motions of constant curvature, in the frame of the request.
+    pub fn path(&self) -> Path {
+        self.path.to_world(&self.frame)
+    }
+
+    /// Poses at most 5 cm apart, each with the gear and the steering angle that follow it: the same
+    /// numbers as in path files.
+    pub fn poses(&self) -> PathFile {
+        let ends = [self.start, self.goal];
+        PathFile::between(ends, &self.vehicle, &self.frame, &self.path, self.method.name())
+    }
+
+    /// The path in time.
+    pub fn trajectory(&self, limits: &TrajectoryLimits) -> Result<Driven, LimitError> {
+        Driven::new([self.start, self.goal], &self.vehicle, &self.frame, &self.path, limits)
+    }
+
+    /// Which goal of the request it leads to.
+    pub fn goal_index(&self) -> usize {
+        self.goal_index
+    }
+
+    /// Clearance kept from what is next to start or goal, metres; from everything else at least
+    /// what was asked for.
+    pub fn margin(&self) -> f64 {
+        self.margin
+    }
+
+    /// How the goal lies in its spot, given or found.
+    pub fn parking_type(&self) -> Option<ParkingType> {
+        self.kind
+    }
+
+    /// Node expansions that it took.
+    pub fn expansions(&self) -> usize {
+        self.expansions
+    }
+
+    /// How guided planning came to it; `None` for plain searches.
+    pub fn route(&self) -> Option<Route> {
+        self.route
+    }
+}

@@ -1,0 +1,325 @@
+//! Plans a scene with any planner: to the cheapest of its goals, or within their tolerance.
+//!
+//! A scene is a list of [`Problem`]s with one goal each: every goal of the scene, and where there is
+//! a tolerance also the poses that stand for it. Planners know nothing of that. Costs are those of [`CostModel`]. What cannot become the
+//! cheapest, because the shortest curve through empty space costs too much already, is not planned.
+//! The order of the goals does not matter, but among equals the first is taken.
+
+use super::contact;
+use super::cost::CostModel;
+use super::{Budget, NoPath, PlanResult, Planner, Problem, ProblemError};
+use crate::curves::{Path, Segment, reeds_shepp};
+use crate::geometry::Pose;
+use crate::world::Scene;
+
+/// What plans keep to besides reaching a goal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Terms {
+    /// Clearance where start and goal allow it, metres: see [`Problem::with_margin`].
+    pub margin: f64,
+    /// How deep start and goal may reach into obstacles, metres: see [`Problem::allowing_contact`].
+    pub contact: f64,
+}
+
+impl Terms {
+    /// Checks both numbers.
+    pub fn check(self) -> Result<(), ProblemError> {
+        if !(0.0..=Problem::MAX_MARGIN).contains(&self.margin) {
+            return Err(ProblemError::Margin(self.margin));
+        }
+        if !(0.0..=Problem::MAX_CONTACT).contains(&self.contact) {
+            return Err(ProblemError::Contact(self.contact));
+        }
+        Ok(())
+    }
+}
+
+impl Default for Terms {
+    /// The usual margin and no contact.
+    fn default() -> Self {
+        Self { margin: Problem::MARGIN, contact: 0.0 }
+    }
+}
+
+/// A plan to one of a scene's goals, or why there is none to any.
+#[derive(Clone, Debug)]
+pub struct Planned {
+    /// Which of [`Scene::all_goals`]; without a path the one that was tried first.
+    pub goal_index: usize,
+    /// The problem of this goal.
+    pub problem: Problem,
+    /// What was found; expansions are those of all goals.
+    pub result: PlanResult,
+    /// Goals that cannot be parked at, and why, in the order of the scene; of those that cost more
+    /// anyway nobody asked.
+    pub passed_over: Vec<(usize, PassedOver)>,
+}
+
+/// Why a goal was not taken, other than for its cost.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PassedOver {
+    /// The car does not fit there.
+    #[error("{0}")]
+    NotFree(ProblemError),
+    /// No path leads there.
+    #[error("{0}")]
+    NoPath(NoPath),
+}
+
+/// The problem by which a scene is introduced to those who need one before it is planned: that of its
+/// first goal that is free. An error where there is none.
+pub fn first_problem(scene: &Scene, terms: Terms) -> Result<Problem, ProblemError> {
+    let mut errors = Vec::new();
+    for index in 0..scene.all_goals().len() {
+        let goal = Goal::new(scene, index, terms);
+        let exact = goal.exact()?;
+        match exact.or_else(|error| goal.beside().find_map(|p| p.map(Ok)).unwrap_or(Err(error))) {
+            Ok(problem) => return Ok(problem),
+            Err(error) => errors.push((index, error)),
+        }
+    }
+    Err(none_free(scene, errors))
+}
+
+/// The error of a scene of whose goals none is free.
+fn none_free(scene: &Scene, mut errors: Vec<(usize, ProblemError)>) -> ProblemError {
+    if scene.goals.is_empty() {
+        return errors.remove(0).1;
+    }
+    errors.sort_by_key(|(index, _)| *index);
+    let field = |(i, error)| (scene.goal_field(i), error);
+    ProblemError::NoGoalFree(errors.into_iter().map(field).collect())
+}
+
+/// One goal of a scene. Its problems are made one at a time: each holds all obstacles.
+struct Goal<'a> {
+    scene: &'a Scene,
+    index: usize,
+    pose: Pose,
+    terms: Terms,
+    model: CostModel,
+}
+
+impl<'a> Goal<'a> {
+    fn new(scene: &'a Scene, index: usize, terms: Terms) -> Self {
+        let model = CostModel::default().scaled(scene.vehicle.scale());
+        Self { scene, index, pose: scene.all_goals()[index], terms, model }
+    }
+
+    /// The problem with exactly this goal, or why the car does not fit there. Other errors are the
+    /// scene's.
+    fn exact(&self) -> Result<Result<Problem, ProblemError>, ProblemError> {
+        let Terms { margin, contact } = self.terms;
+        let single;
+        // Most scenes have one goal and are not copied.
+        let scene = if self.scene.goals.is_empty() {
+            self.scene
+        } else {
+            single = self.scene.with_goal(self.pose);
+            &single
+        };
+        match Problem::allowing_contact(scene, margin, contact) {
+            Err(error @ ProblemError::GoalInCollision(..)) => Ok(Err(error)),
+            other => other.map(Ok),
+        }
+    }
+
+    /// The poses within its tolerance that are tried besides the goal itself, in a fixed order.
+    fn poses_beside(&self) -> Vec<Pose> {
+        let Some(tolerance) = self.scene.goal_tolerance else { return Vec::new() };
+        let mut poses = tolerance.poses(self.pose).split_off(1);
+        // Who stands within the tolerance may stay there.
+        if tolerance.holds(self.pose, self.scene.start, 0.0) {
+            poses.insert(0, self.scene.start);
+        }
+        poses
+    }
+
+    /// The problem of one of [`Goal::poses_beside`]; `None` where the car does not fit.
+    fn to(&self, pose: Pose) -> Option<Problem> {
+        let scene = self.scene.with_goal(pose);
+        let mut problem =
+            Problem::unexplained(&scene, self.terms.margin, self.terms.contact).ok()?;
+        let centre = problem.frame.local_from_world(self.pose);
+        problem.tolerance = self.scene.goal_tolerance.map(|tolerance| (centre, tolerance));
+        Some(problem)
+    }
+
+    /// The problems of all these poses.
+    fn beside(&self) -> impl Iterator<Item = Option<Problem>> + '_ {
+        self.poses_beside().into_iter().map(|pose| self.to(pose))
+    }
+
+    /// What driving to `pose` costs at least, obstacles aside.
+    fn least_cost_to(&self, pose: Pose) -> f64 {
+        let Scene { start, vehicle, .. } = self.scene;
+        // As far from the origin as the scene lies numbers are coarser.
+        let here = Pose::new(0.0, 0.0, start.heading);
+        let there = Pose::new(pose.x - start.x, pose.y - start.y, pose.heading);
+        let length = reeds_shepp::shortest_length(here, there, 1.0 / vehicle.max_curvature());
+        // A rounding less, so that equals are compared by what they cost.
+        self.per_metre() * length * (1.0 - 1e-9)
+    }
+
+    /// What driving to the goal or anywhere within its tolerance costs at least.
+    fn least_cost(&self) -> f64 {
+        let Some(tolerance) = self.scene.goal_tolerance else {
+            return self.least_cost_to(self.pose);
+        };
+        let apart = self.scene.start.distance(self.pose) - tolerance.position_m;
+        self.per_metre() * apart.max(0.0) * (1.0 - 1e-9)
+    }
+
+    fn per_metre(&self) -> f64 {
+        self.model.forward.min(self.model.backward)
+    }
+
+    /// The cheapest path that `planner` finds there, exactly to the goal or within its tolerance, or
+    /// why the car does not fit.
+    fn plan(
+        &self,
+        planner: &mut dyn Planner,
+        budget: Budget,
+    ) -> Result<Result<Found, ProblemError>, ProblemError> {
+        let found = |problem: Problem, result: PlanResult| {
+            let result = ended_early(&problem, result);
+            let path = result.outcome.as_ref();
+            let cost = |path: &Path| self.model.path(&problem.vehicle, &path.segments);
+            let cost = path.map_or(f64::INFINITY, cost);
+            Found { index: self.index, problem, result, cost }
+        };
+        let exact = self.exact()?.map(|problem| {
+            let result = contact::plan(planner, &problem, budget);
+            found(problem, result)
+        });
+        let mut expansions = exact.as_ref().map_or(0, |b| b.result.expansions);
+        let mut best = exact;
+        let mut left = budget.max_expansions;
+        for pose in self.poses_beside() {
+            let beaten = |b: &Found| left == 0 || b.beats(self.least_cost_to(pose));
+            if best.as_ref().is_ok_and(beaten) {
+                continue;
+            }
+            let Some(problem) = self.to(pose) else { continue };
+            // Who has arrived already stays.
+            let stays = PlanResult::certified(&problem, Path::new(problem.start, []), 0);
+            let result = match stays.outcome {
+                Ok(_) => stays,
+                Err(_) => {
+                    contact::plan(planner, &problem, Budget { max_expansions: left, ..budget })
+                }
+            };
+            expansions += result.expansions;
+            left = left.saturating_sub(result.expansions);
+            let other = found(problem, result);
+            if best.as_ref().is_ok_and(|b| b.rank() <= other.rank()) {
+                continue;
+            }
+            best = Ok(other);
+        }
+        Ok(best.map(|b| Found { result: PlanResult { expansions, ..b.result }, ..b }))
+    }
+}
+
+/// What came of one goal.
+struct Found {
+    index: usize,
+    problem: Problem,
+    result: PlanResult,
+    cost: f64,
+}
+
+impl Found {
+    /// What is compared: contact at the goal that can be avoided is, whatever it costs.
+    fn rank(&self) -> (bool, f64) {
+        (self.problem.contact.as_ref().is_some_and(|c| c.goal_depth > 0.0), self.cost)
+    }
+
+    /// Whether nothing that costs `bound` or more can be better.
+    fn beats(&self, bound: f64) -> bool {
+        let (touches, cost) = self.rank();
+        !touches && cost <= bound
+    }
+}
+
+/// Plans `scene` by `planner` to the cheapest of its goals.
+///
+/// Every goal has the budget for itself, and where there is a tolerance once more for the poses
+/// beside it. An error where the scene is none, its start is not free or none of its goals.
+pub fn plan(
+    planner: &mut dyn Planner,
+    scene: &Scene,
+    terms: Terms,
+    budget: Budget,
+) -> Result<Planned, ProblemError> {
+    scene.check_numbers()?;
+    let goals = (0..scene.all_goals().len()).map(|index| Goal::new(scene, index, terms));
+    let mut goals: Vec<(f64, Goal)> = goals.map(|goal| (goal.least_cost(), goal)).collect();
+    // The nearest first: what they cost leaves out most of the others. Sorting is stable.
+    goals.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut best: Option<Found> = None;
+    let mut failed: Option<Found> = None;
+    let (mut errors, mut no_path) = (Vec::new(), Vec::new());
+    let mut expansions = 0;
+    for (bound, goal) in goals {
+        if best.as_ref().is_some_and(|b| b.beats(bound) && b.cost < bound) {
+            break;
+        }
+        let found = match goal.plan(planner, budget)? {
+            Ok(found) => found,
+            Err(error) => {
+                errors.push((goal.index, error));
+                continue;
+            }
+        };
+        expansions += found.result.expansions;
+        if let Err(reason) = found.result.outcome {
+            no_path.push((goal.index, reason));
+            failed = failed.or(Some(found));
+        } else if best.as_ref().is_none_or(|b| (found.rank(), found.index) < (b.rank(), b.index)) {
+            best = Some(found);
+        }
+    }
+    let Some(Found { index: goal_index, problem, result, .. }) = best.or(failed) else {
+        return Err(none_free(scene, errors));
+    };
+    let result = PlanResult { expansions, ..result };
+    let not_free = errors.into_iter().map(|(index, error)| (index, PassedOver::NotFree(error)));
+    let no_path = no_path.into_iter().map(|(index, reason)| (index, PassedOver::NoPath(reason)));
+    let mut passed_over: Vec<_> = not_free.chain(no_path).collect();
+    passed_over.sort_by_key(|(index, _)| *index);
+    Ok(Planned { goal_index, problem, result, passed_over })
+}
+
+/// The same plan, ended where it first comes within the tolerance.
+fn ended_early(problem: &Problem, result: PlanResult) -> PlanResult {
+    let (Some((goal, tolerance)), Ok(path), None) =
+        (problem.tolerance, &result.outcome, result.covered)
+    else {
+        return result;
+    };
+    // Half of what the certificate forgives: headings that are to be equal differ by roundings.
+    let arrived = |pose| tolerance.holds(goal, pose, Problem::ROUNDING / 2.0);
+    let Some(path) = up_to(path, arrived) else { return result };
+    let early = PlanResult::certified(problem, path, result.expansions);
+    match early.outcome {
+        Ok(_) => PlanResult { guidance: result.guidance, ..early },
+        Err(_) => result,
+    }
+}
+
+/// `path` to the first of its poses that has `arrived`, to the centimetre.
+fn up_to(path: &Path, arrived: impl Fn(Pose) -> bool) -> Option<Path> {
+    const STEP: f64 = 0.01;
+    let mut driven = Vec::new();
+    for (from, segment) in path.legs() {
+        let steps = (segment.length.abs() / STEP).ceil().max(1.0);
+        let mut lengths = (0..=steps as u32).map(|i| segment.length * f64::from(i) / steps);
+        if let Some(length) = lengths.find(|&l| arrived(segment.at(from, l))) {
+            driven.push(Segment { length, ..segment });
+            return Some(Path::new(path.start, driven));
+        }
+        driven.push(segment);
+    }
+    None
+}

@@ -1,0 +1,216 @@
+//! The scene format: JSON in, a scene or a message that names the field out.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, error::Category};
+
+use super::ParkingType;
+use super::goals::GoalTolerance;
+use super::scene::{Scene, SceneError};
+use crate::geometry::Pose;
+use crate::vehicle::Vehicle;
+
+/// A scene as it is written: with one `goal`, or with `goals`.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SceneFile {
+    #[serde(default)]
+    name: String,
+    #[serde(default)]
+    source: String,
+    vehicle: Vehicle,
+    start: Pose,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    goal: Option<Pose>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    goals: Option<Vec<Pose>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    goal_tolerance: Option<GoalTolerance>,
+    #[serde(default)]
+    parking_type: Option<ParkingType>,
+    obstacles: Vec<Vec<[f64; 2]>>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    points: Vec<[f64; 2]>,
+    #[serde(default)]
+    bounds: Option<[f64; 4]>,
+}
+
+impl TryFrom<SceneFile> for Scene {
+    type Error = String;
+
+    fn try_from(file: SceneFile) -> Result<Scene, String> {
+        let (goal, goals) = match (file.goal, file.goals) {
+            (Some(goal), None) => (goal, Vec::new()),
+            (None, Some(goals)) => match goals.first() {
+                Some(&first) => (first, goals),
+                None => return Err("goals is []; expected at least one pose [x, y, θ]".to_owned()),
+            },
+            (Some(_), Some(_)) => {
+                return Err("has both goal and goals; leave one of them out".to_owned());
+            }
+            (None, None) => {
+                let text = "missing field `goal`; give one pose, or several as goals";
+                return Err(text.to_owned());
+            }
+        };
+        let SceneFile { name, source, vehicle, start, goal_tolerance, .. } = file;
+        let SceneFile { parking_type, obstacles, points, bounds, .. } = file;
+        Ok(Scene {
+            name,
+            source,
+            vehicle,
+            start,
+            goal,
+            goals,
+            goal_tolerance,
+            parking_type,
+            obstacles,
+            points,
+            bounds,
+        })
+    }
+}
+
+impl From<Scene> for SceneFile {
+    fn from(scene: Scene) -> Self {
+        let one = scene.goals.is_empty();
+        Self {
+            name: scene.name,
+            source: scene.source,
+            vehicle: scene.vehicle,
+            start: scene.start,
+            goal: one.then_some(scene.goal),
+            goals: (!one).then_some(scene.goals),
+            goal_tolerance: scene.goal_tolerance,
+            parking_type: scene.parking_type,
+            obstacles: scene.obstacles,
+            points: scene.points,
+            bounds: scene.bounds,
+        }
+    }
+}
+
+/// The key whose value a syntax error lies in, as far as the text tells.
+fn key_before<'a>(text: &'a str, error: &serde_json::Error) -> Option<&'a str> {
+    let before: usize =
+        text.split_inclusive('\n').take(error.line().saturating_sub(1)).map(str::len).sum();
+    let head = text.get(..before + error.column().saturating_sub(1))?;
+    let head = &head[..head.rfind("\":")?];
+    Some(&head[head.rfind('"')? + 1..])
+}
+
+pub(super) fn parse_json(text: &str, path: &Path) -> Result<Scene, SceneError> {
+    let error = match serde_json::from_str(text) {
+        Ok(scene) => return Ok(scene),
+        Err(error) => error,
+    };
+    // The slow way, only for a message that names the field: first the syntax alone,
+    // then the shapes, then what serde says.
+    let message = match serde_json::from_str::<Value>(text) {
+        Err(syntax) => match (word_at(text, &syntax), syntax.classify()) {
+            (Some(word), _) => format!(
+                "{}{word} at line {} column {} is not a number; every value must be finite",
+                key_before(text, &syntax).map_or(String::new(), |key| format!("{key}: ")),
+                syntax.line(),
+                syntax.column()
+            ),
+            (None, Category::Eof) => format!("is cut short: {syntax}"),
+            (None, _) => format!("is not valid JSON: {syntax}"),
+        },
+        Ok(value) => match misshapen(&value) {
+            Some((field, message)) => {
+                return Err(SceneError::Invalid { path: path.to_owned(), field, message });
+            }
+            None => format!("is not a scene: {error}"),
+        },
+    };
+    Err(SceneError::Format { path: path.to_owned(), message })
+}
+
+/// The `NaN` or `Infinity` that a JSON syntax error stopped at.
+fn word_at<'a>(text: &'a str, error: &serde_json::Error) -> Option<&'a str> {
+    let line = text.lines().nth(error.line().checked_sub(1)?)?;
+    let belongs = |c: char| c.is_ascii_alphabetic() || c == '-' || c == '+';
+    let mut from = 0;
+    line.split(|c| !belongs(c)).find(|word| {
+        let range = from..=from + word.len() + 1;
+        from += word.len() + 1;
+        let name = word.trim_start_matches(['-', '+']).to_ascii_lowercase();
+        range.contains(&error.column()) && ["nan", "inf", "infinity"].contains(&name.as_str())
+    })
+}
+
+/// The first geometric field that is not the numbers it should be.
+fn misshapen(scene: &Value) -> Option<(String, String)> {
+    let list = |field: &str| {
+        let items = scene.get(field).and_then(Value::as_array);
+        items.into_iter().flatten().enumerate()
+    };
+    let pose = |field: &str| not_numbers(scene.get(field)?, 3, field.to_owned());
+    let bounds = scene.get("bounds").filter(|b| !b.is_null());
+    pose("start")
+        .or_else(|| pose("goal"))
+        .or_else(|| match scene.get("goals")? {
+            Value::Array(goals) => {
+                let mut goals = goals.iter().enumerate();
+                goals.find_map(|(i, goal)| not_numbers(goal, 3, format!("goals[{i}]")))
+            }
+            other => {
+                let message = format!("is {}; expected a list of poses [x, y, θ]", brief(other));
+                Some(("goals".to_owned(), message))
+            }
+        })
+        .or_else(|| wrong_tolerance(scene.get("goal_tolerance")?))
+        .or_else(|| not_numbers(bounds?, 4, "bounds".to_owned()))
+        .or_else(|| {
+            list("points").find_map(|(i, point)| not_numbers(point, 2, format!("points[{i}]")))
+        })
+        .or_else(|| {
+            list("obstacles").find_map(|(i, polygon)| {
+                let Some(vertices) = polygon.as_array() else {
+                    let message = format!("is {}; expected a list of [x, y]", brief(polygon));
+                    return Some((format!("obstacles[{i}]"), message));
+                };
+                let field = |j| format!("obstacles[{i}][{j}]");
+                vertices.iter().enumerate().find_map(|(j, v)| not_numbers(v, 2, field(j)))
+            })
+        })
+}
+
+/// What is wrong with a goal tolerance that is not two numbers.
+fn wrong_tolerance(value: &Value) -> Option<(String, String)> {
+    const FIELDS: [&str; 2] = ["position_m", "heading_rad"];
+    let Some(given) = value.as_object() else {
+        let shape = r#"expected {"position_m": metres, "heading_rad": radians}"#;
+        let wrong = format!("is {}; {shape}", brief(value));
+        return (!value.is_null()).then_some(("goal_tolerance".to_owned(), wrong));
+    };
+    given.iter().find_map(|(name, value)| {
+        let message = match (FIELDS.contains(&name.as_str()), value.is_number()) {
+            (true, true) => return None,
+            (true, false) => format!("is {}; expected a finite number", brief(value)),
+            (false, _) => "is unknown; expected position_m and heading_rad".to_owned(),
+        };
+        Some((format!("goal_tolerance.{name}"), message))
+    })
+}
+
+/// What is wrong with `value`, where `count` numbers are expected.
+fn not_numbers(value: &Value, count: usize, field: String) -> Option<(String, String)> {
+    let numbers = value.as_array().is_some_and(|v| v.iter().all(Value::is_number));
+    let length = value.as_array().map_or(0, Vec::len);
+    if numbers && length == count {
+        return None;
+    }
+    Some((field, format!("is {}; expected {count} finite numbers", brief(value))))
+}
+
+/// The value as JSON, cut to a readable length.
+fn brief(value: &Value) -> String {
+    let json = value.to_string();
+    match json.char_indices().nth(60) {
+        Some((end, _)) => format!("{}…", &json[..end]),
+        None => json,
+    }
+}
