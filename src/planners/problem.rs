@@ -19,6 +19,9 @@ pub struct Problem {
     pub frame: Frame,
     /// How the goal lies in its spot; `None` where no spot is known.
     pub kind: Option<ParkingType>,
+    /// How much farther out the lane begins than beside a usual spot, metres: the depth that a bay
+    /// has on top of a usual one's, or what stands out into the lane.
+    pub mouth: f64,
     /// Rear-axle start, planning frame.
     pub start: Pose,
     /// Rear-axle goal, planning frame.
@@ -146,7 +149,7 @@ impl Problem {
 
     fn seen(scene: &Scene, margin: f64, precision: Precision) -> Result<Problem, ProblemError> {
         scene.check_numbers()?;
-        let SpotGuess { frame, kind, obstacles } = spot::guess(scene, precision)?;
+        let SpotGuess { frame, kind, obstacles, mouth } = spot::guess(scene, precision)?;
         let bounds = scene.bounds.map(|b| spot::bounds_in_frame(b, &frame, precision));
         let start = precision.pose(frame.local_from_world(scene.start));
         let goal = match precision {
@@ -156,19 +159,17 @@ impl Problem {
                 scene.vehicle.rear_axle(Pose::new(0.0, 0.0, kind.goal_heading()))
             }),
         };
-        Self::checked(scene.vehicle, frame, kind, [start, goal], obstacles, bounds, margin).map_err(
-            |e| match e {
-                ProblemError::StartInCollision(..) => ProblemError::StartInCollision(
-                    scene.start.into(),
-                    Conflict::of(scene, scene.start),
-                ),
-                ProblemError::GoalInCollision(..) => ProblemError::GoalInCollision(
-                    scene.goal.into(),
-                    Conflict::of(scene, scene.goal),
-                ),
-                other => other,
-            },
-        )
+        let problem =
+            Self::checked(scene.vehicle, frame, kind, [start, goal], obstacles, bounds, margin);
+        problem.map(|problem| Problem { mouth, ..problem }).map_err(|e| match e {
+            ProblemError::StartInCollision(..) => {
+                ProblemError::StartInCollision(scene.start.into(), Conflict::of(scene, scene.start))
+            }
+            ProblemError::GoalInCollision(..) => {
+                ProblemError::GoalInCollision(scene.goal.into(), Conflict::of(scene, scene.goal))
+            }
+            other => other,
+        })
     }
 
     /// The problem of parking in an abstracted environment, as the data collection does.
@@ -217,7 +218,8 @@ impl Problem {
         if !collision.pose_is_free(goal) {
             return Err(ProblemError::GoalInCollision(goal.into(), Conflict::Unknown));
         }
-        Ok(Problem { vehicle, frame, kind, start, goal, obstacles, collision, margin })
+        let mouth = 0.0;
+        Ok(Problem { vehicle, frame, kind, mouth, start, goal, obstacles, collision, margin })
     }
 
     /// What is tried in turn where start or goal does not allow `margin`, metres.

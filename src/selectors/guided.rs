@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::curves::{Path, Segment};
 use crate::geometry::{Pose, Vec2};
+use crate::planners::cost::CostModel;
 use crate::planners::hybrid_astar::{Entry, GoalSet, Leg};
 use crate::planners::library::{Library, LibraryPlan, LibrarySearch, Verdicts};
 use crate::planners::{
@@ -52,6 +53,9 @@ const DOUBTFUL: f64 = 2.0;
 const SECOND_SEARCH: usize = 1500;
 /// Expansions for something better than a plan that was known.
 const PATIENCE: usize = 400;
+/// Where the lane begins farther out than this beyond a usual spot's, metres for the default vehicle,
+/// manoeuvres are tried that end farther out, too.
+const DEEPER: f64 = 0.3;
 /// Those it tries where there is no such curve. Each takes some microseconds, together they take a
 /// quarter of what a search usually does; generated scenes need 24 of them at most.
 const TRIES: usize = 64;
@@ -194,7 +198,46 @@ impl GuidedPlanner {
         {
             best = Some(by_manoeuvre(better));
         }
-        best
+        self.from_the_mouth(problem, &cost, best)
+    }
+
+    /// The best so far, or a plan by a manoeuvre that ends where a usual bay's goal would be, farther
+    /// out, and the straight from there where that costs less.
+    fn from_the_mouth(
+        &mut self,
+        problem: &Problem,
+        model: &CostModel,
+        mut best: Option<Known>,
+    ) -> Option<Known> {
+        let [gear] = problem.entry_gears() else { return best };
+        if problem.mouth <= DEEPER * problem.vehicle.scale() {
+            return best;
+        }
+        let straight = Segment { length: gear.sign() * problem.mouth, curvature: 0.0 };
+        let end = problem.goal.shifted(-straight.length);
+        if !problem.collision.segments_are_free(end, &[straight]) {
+            return best;
+        }
+        let Self { libraries, library_search, verdicts, .. } = self;
+        let library = &libraries[0].library;
+        verdicts.clear();
+        let any = f64::INFINITY;
+        let in_cost = model.per_metre(*gear) * problem.mouth;
+        let mut look_up = library_search.look_up_at(library, verdicts, problem, end, model, any);
+        let (least, _) = look_up.least_estimates(library.len());
+        let mut tries = FIRST_TRIES;
+        loop {
+            let bound = best.as_ref().map_or(any, |known| known.cost * (1.0 - GAIN) - in_cost);
+            let Some(LibraryPlan { mut path, preparatory, .. }) = look_up.next(bound, tries) else {
+                return best;
+            };
+            path.extend([straight]);
+            let cost = model.path(&problem.vehicle, &path.segments);
+            let guidance = Guidance { preparatory: Some(preparatory), route: Route::Library };
+            let least = best.as_ref().map_or(least + in_cost, |b| b.least.min(least + in_cost));
+            best = Some(Known { path, cost, guidance, least });
+            tries = BETTER;
+        }
     }
 
     /// Puts the library for `problem` first, prepared if need be, and says whether there is one.
@@ -274,7 +317,7 @@ impl GuidedPlanner {
         config: RankedConfig,
         left: &mut usize,
     ) -> Result<(Path, Guidance), NoPath> {
-        let mut goal = self.hars.goal_set(problem);
+        let mut goal = self.hars.goal_set_of_cell(problem, problem.mouth);
         let has_library = config.library && self.prepare_library(problem);
         if has_library && let Some(known) = self.look_up(problem, &goal) {
             return Ok(self.settle(problem, &goal, known, left));
@@ -324,6 +367,19 @@ impl GuidedPlanner {
             || known.cost <= ENOUGH * self.hars.lower_bound(problem, goal)
     }
 
+    /// Whether a plan costs more than usual by a spot that no cell of the model stands for.
+    fn is_unusually_dear(
+        &mut self,
+        problem: &Problem,
+        goal: &GoalSet,
+        cost: f64,
+        least: f64,
+    ) -> bool {
+        cost > USUAL * least
+            && cost > ENOUGH * self.hars.lower_bound(problem, goal)
+            && (problem.mouth > DEEPER * problem.vehicle.scale() || self.cells(problem).is_empty())
+    }
+
     /// What is known, or the rest of the manoeuvre that the car stands in where that costs less: who
     /// replans on the way goes on.
     fn or_rest(&mut self, problem: &Problem, known: Known) -> Known {
@@ -361,7 +417,8 @@ impl GuidedPlanner {
         let mut refined = self.hars.refine(problem, goal, path.clone(), PATIENCE, left);
         let model = self.hars.cost(&problem.vehicle);
         let cost = |path: &Path| model.path(&problem.vehicle, &path.segments);
-        if refined.direction_changes() > 2 && cost(&refined) > DOUBTFUL * least {
+        let doubtful = refined.direction_changes() > 2 && cost(&refined) > DOUBTFUL * least;
+        if doubtful || self.is_unusually_dear(problem, goal, cost(&refined), least) {
             let share = SECOND_SEARCH.min(*left);
             let mut spend = share;
             let found = self.hars.search(problem, problem.start, goal, None, &mut spend);

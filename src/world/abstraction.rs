@@ -40,8 +40,13 @@ impl Abstraction {
 /// Obstacles that only touch a region's border do not enter it.
 const TOUCH: f64 = 1e-6;
 
-/// The farthest a bay's lane may begin beyond its usual boundary, of the bay's depth.
-const MAX_SHIFT: f64 = 1.0 / 5.5;
+/// The farthest a bay's lane may begin beyond its usual boundary, of the bay's depth: a car parked
+/// at the bottom of a bay 9 m deep, or pillars and kerbs that reach as far into the lane.
+const MAX_SHIFT: f64 = 4.0 / 5.5;
+/// The same where only what stands out farthest in the row is asked for.
+const USUAL_SHIFT: f64 = 1.0 / 5.5;
+/// Farther out the lane is looked for in steps, of the bay's depth.
+const SHIFT_STEP: f64 = 0.25 / 5.5;
 
 /// The cells found around the spot, largest lane first; none where the scene has no such
 /// structure or lies below the grid.
@@ -82,6 +87,23 @@ impl Surroundings {
         self.polygons.last().map_or(0, |p| p.end)
     }
 
+    /// How far from `from` along the unit vector `along` the first obstacle is, at most `most`.
+    pub fn free_along(&self, from: Vec2, along: Vec2, most: f64) -> f64 {
+        let across = Vec2::new(-along.y, along.x);
+        let mut free = most;
+        for (a, b) in &self.edges {
+            let ((xa, ya), (xb, yb)) =
+                [a, b].map(|p| ((p - from).dot(&along), (p - from).dot(&across))).into();
+            if (ya <= 0.0) != (yb <= 0.0) {
+                let x = xa + (xb - xa) * ya / (ya - yb);
+                if x >= 0.0 {
+                    free = free.min(x);
+                }
+            }
+        }
+        free
+    }
+
     /// Adds a point.
     pub fn add_point(&mut self, p: Vec2) {
         self.edges.push((p, p));
@@ -95,22 +117,34 @@ impl Surroundings {
 
     /// [`abstractions`] among these obstacles.
     pub fn abstractions(&self, kind: ParkingType, grid: &Grid) -> Vec<Abstraction> {
+        let mut found = self.lanes(kind, grid);
+        // No straight leads from a lane farther out into a parallel spot: no cell's manoeuvre fits.
+        found.retain(|lane| lane.shift == 0.0 || kind.is_bay());
+        found
+    }
+
+    /// The lanes beside the spot, largest first, also those that begin farther out than the cells
+    /// of a parallel spot.
+    pub fn lanes(&self, kind: ParkingType, grid: &Grid) -> Vec<Abstraction> {
         // What could enter a cell, or bounds the spot.
         let floor = -grid.lane_boundary(kind);
         let most = MAX_SHIFT * grid.bay_depth;
         let top = grid.lane_boundary(kind) + most + grid.lane_width.max;
         let is_near = |(a, b): &(Vec2, Vec2)| a.y.max(b.y) > floor && a.y.min(b.y) < top;
         let edges: Vec<_> = self.edges.iter().copied().filter(is_near).collect();
-        let mut found = Vec::new();
         let low = bottom_shift(&edges, kind, grid);
-        for shift in [low, self.protrusion(kind, grid).max(low)] {
-            if shift > most || (shift > 0.0 && !kind.is_bay()) {
-                continue;
+        let at =
+            |shift| if shift <= most { at_shift(&edges, kind, grid, shift) } else { Vec::new() };
+        let mut found = at(low);
+        if found.is_empty() {
+            let row = self.protrusion(kind, grid).max(low);
+            if row > low && row <= USUAL_SHIFT * grid.bay_depth {
+                found = at(row);
             }
-            found = at_shift(&edges, kind, grid, shift);
-            if !found.is_empty() {
-                break;
-            }
+        }
+        if found.is_empty() {
+            let steps = farther_out(&edges, kind, grid, low);
+            found = steps.into_iter().map(at).find(|lanes| !lanes.is_empty()).unwrap_or_default();
         }
         found
     }
@@ -132,12 +166,30 @@ impl Surroundings {
             }
         }
         for (p, _) in &self.edges[self.points_begin()..] {
-            if p.x > x_min && p.x < x_max && p.y < boundary + MAX_SHIFT * grid.bay_depth {
+            if p.x > x_min && p.x < x_max && p.y < boundary + USUAL_SHIFT * grid.bay_depth {
                 top = top.max(p.y);
             }
         }
         top - boundary
     }
+}
+
+/// How far out a lane may begin, farther than `low`, nearest first: just beyond something.
+fn farther_out(edges: &[(Vec2, Vec2)], kind: ParkingType, grid: &Grid, low: f64) -> Vec<f64> {
+    let boundary = grid.lane_boundary(kind);
+    let (step, most) = (SHIFT_STEP * grid.bay_depth, MAX_SHIFT * grid.bay_depth);
+    // The farthest end of something in every step.
+    let mut ends = [f64::NEG_INFINITY; (MAX_SHIFT / SHIFT_STEP) as usize + 2];
+    for &(a, b) in edges {
+        let beside = a.x.max(b.x) < -grid.back || a.x.min(b.x) > grid.dead_end.max;
+        for end in [a.y - boundary, b.y - boundary] {
+            if !beside && end > low && end <= most {
+                let end_of_step = &mut ends[(end / step) as usize];
+                *end_of_step = end_of_step.max(end);
+            }
+        }
+    }
+    ends.into_iter().filter(|end| end.is_finite()).collect()
 }
 
 /// The maximal cells whose frame lies `shift` metres along +y.

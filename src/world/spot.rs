@@ -9,11 +9,15 @@
 //! A goal alone does not say which way its lane lies: ahead of the nose (parked in reverse),
 //! behind the tail (forward) or beside the car (parallel, on either side), each travelled in one of two
 //! directions. Each of these is held against the obstacles by [`super::abstraction`]: it is possible
-//! where the smallest cell is free. A parking type given with the scene leaves only its two
-//! directions to choose from.
+//! where the smallest cell is free. Where none is, less will do: a lane that the car just passes
+//! through and that may end beside the spot, and a spot in which it just stands. A parking type given
+//! with the scene leaves only its two directions to choose from.
+//!
+//! A lane that begins farther out than usual may be no more than the corner between slanted rows. It
+//! is one where no other direction leads farther than along it; oblique bays so have no type.
 
 use super::abstraction::{Abstraction, Surroundings, abstractions};
-use super::cell::Grid;
+use super::cell::{Axis, Grid};
 use super::{ObstacleError, Obstacles, ParkingType, Scene};
 use crate::geometry::{Aabb, Frame, Pose, Vec2, segment_in_box};
 
@@ -68,31 +72,66 @@ pub struct SpotGuess {
     pub kind: Option<ParkingType>,
     /// The obstacles, seen from the frame.
     pub obstacles: Obstacles,
+    /// How much farther from the parked centre the lane begins than beside a usual spot, metres;
+    /// 0 where none was found.
+    pub mouth: f64,
 }
 
 /// The planning frame of a scene.
 pub fn guess(scene: &Scene, precision: Precision) -> Result<SpotGuess, ObstacleError> {
-    let seen = |frame, kind| seen(scene, frame, kind, precision);
+    let seen = |frame, kind, mouth| seen(scene, frame, kind, mouth, precision);
     let Some(kind) = scene.parking_type else {
-        return match found(scene, precision) {
-            Some((frame, kind)) => seen(frame, Some(kind)),
-            None => seen(goal_frame(scene), None),
+        return match found(scene, &ParkingType::ALL, precision) {
+            Some(Found { frame, kind, mouth }) => seen(frame, Some(kind), mouth),
+            None => seen(goal_frame(scene), None, 0.0),
         };
     };
     let usual = spot_frame(scene, kind);
-    let guess = seen(usual, Some(kind))?;
+    let guess = seen(usual, Some(kind), 0.0)?;
     let grid = grid(scene);
-    if lane_is_open(&guess.obstacles, kind, &grid) || lane(&guess, &grid).is_some() {
+    if lane_is_open(&guess.obstacles, kind, &grid) {
         return Ok(guess);
     }
+    if let Some(lane) = lane(&guess, &grid) {
+        return Ok(SpotGuess { mouth: lane.shift, ..guess });
+    }
     // The car may come from the other side, or stand across the lane.
-    let other = seen(other_way(&usual, kind), Some(kind))?;
-    Ok(if lane(&other, &grid).is_some() { other } else { guess })
+    let other = seen(other_way(&usual, kind), Some(kind), 0.0)?;
+    if let Some(lane) = lane(&other, &grid) {
+        return Ok(SpotGuess { mouth: lane.shift, ..other });
+    }
+    match found(scene, &[kind], precision) {
+        Some(Found { frame, mouth, .. }) => seen(frame, Some(kind), mouth),
+        None => Ok(guess),
+    }
 }
 
 /// The usual spots and lanes, for the size of the vehicle.
 fn grid(scene: &Scene) -> Grid {
     Grid::default().scaled(scene.vehicle.scale())
+}
+
+/// The least that still is a spot beside a lane: the car stands in it and passes through it, and the
+/// lane may end beside the spot.
+fn least_grid(scene: &Scene, kind: ParkingType) -> Grid {
+    /// Room on each side of the parked car, that in the lane beside it, and how far the lane
+    /// reaches back, metres for the default vehicle.
+    const ROOM: f64 = 0.02;
+    const LANE_ROOM: f64 = 1.0;
+    const BACK: f64 = 5.0;
+    let vehicle = &scene.vehicle;
+    let scale = vehicle.scale();
+    let usual = grid(scene);
+    let along = if kind.is_bay() { vehicle.width } else { vehicle.length } + 2.0 * ROOM * scale;
+    let from = |min: f64, axis: Axis| Axis { min: min.min(axis.min), ..axis };
+    Grid {
+        lane_width: from(vehicle.width + LANE_ROOM * scale, usual.lane_width),
+        bay_spot_width: from(along, usual.bay_spot_width),
+        parallel_spot_width: from(along, usual.parallel_spot_width),
+        dead_end: from(along / 2.0, usual.dead_end),
+        back: BACK * scale,
+        ..usual
+    }
 }
 
 /// The goal's own frame, mirrored where the car would start to its right.
@@ -101,23 +140,79 @@ fn goal_frame(scene: &Scene) -> Frame {
     Frame { mirrored: plain.local_from_world(scene.start).y < 0.0, ..plain }
 }
 
-/// The likeliest spot: the car stands in its lane rather than elsewhere, and the lane is large.
-fn found(scene: &Scene, precision: Precision) -> Option<(Frame, ParkingType)> {
+/// A spot beside a lane.
+#[derive(Clone, Copy)]
+struct Found {
+    frame: Frame,
+    kind: ParkingType,
+    /// See [`SpotGuess`].
+    mouth: f64,
+}
+
+/// The likeliest spot of one of `kinds`: the car stands in its lane rather than elsewhere, and the
+/// lane is large. Usual ones first.
+fn found(scene: &Scene, kinds: &[ParkingType], precision: Precision) -> Option<Found> {
     let near = around_goal(scene, precision);
-    let grid = grid(scene);
-    let mut best: Option<((bool, f64), Frame, ParkingType)> = None;
-    for kind in ParkingType::ALL {
-        let usual = spot_frame(scene, kind);
-        for frame in [usual, other_way(&usual, kind)] {
+    let usual = grid(scene);
+    let views = kinds.iter().flat_map(|&kind| {
+        let frame = spot_frame(scene, kind);
+        [frame, other_way(&frame, kind)].map(|frame| {
             let seen = near.map(|p| from_parked(p, kind, frame.mirrored));
-            let Some(lane) = seen.abstractions(kind, &grid).first().copied() else { continue };
+            (kind, frame, seen)
+        })
+    });
+    let views: Vec<_> = views.collect();
+    let best = |grid: &dyn Fn(ParkingType) -> Grid, trusted: f64| {
+        let mut best: Option<((bool, f64), Found)> = None;
+        for &(kind, frame, ref seen) in &views {
+            let grid = grid(kind);
+            let Some(lane) = seen.lanes(kind, &grid).first().copied() else { continue };
+            let far = lane.shift > trusted * scene.vehicle.scale();
+            if far && !is_along(seen, &lane, &grid) {
+                continue;
+            }
             let merit = merit(&lane, &grid, frame.local_from_world(scene.start));
-            if best.is_none_or(|(most, ..)| merit > most) {
-                best = Some((merit, frame, kind));
+            if best.is_none_or(|(most, _)| merit > most) {
+                best = Some((merit, Found { frame, kind, mouth: lane.shift }));
             }
         }
-    }
-    best.map(|(_, frame, kind)| (frame, kind))
+        best.map(|(_, found)| found)
+    };
+    best(&|_| usual, TRUSTED).or_else(|| best(&|kind| least_grid(scene, kind), -1.0))
+}
+
+/// A usual lane that begins at most so much farther out than usual is one, metres for the default
+/// vehicle: bays end there where the car stands a little deeper, or its neighbours less deep.
+const TRUSTED: f64 = 1.0;
+
+/// Whether no oblique direction leads farther from the middle of the lane than one along it.
+fn is_along(seen: &Surroundings, lane: &Abstraction, grid: &Grid) -> bool {
+    /// What is as far away as this many times the cells' lane behind counts as endless.
+    const ENDLESS: f64 = 2.0;
+    /// An oblique direction may lead a little farther.
+    const SLACK: f64 = 1.1;
+    let [area, _] = lane.regions(grid);
+    let free = |share: f64, turn: f64, side: f64| {
+        let from = Vec2::new(0.0, area.min.y + share * (area.max.y - area.min.y));
+        let (sin, cos) = turn.to_radians().sin_cos();
+        seen.free_along(from, Vec2::new(cos * side, sin), ENDLESS * grid.back)
+    };
+    // Side by side, as gaps between cars lead far, too.
+    let along = [1.0, -1.0].map(|side| {
+        [0.1, 0.3, 0.5, 0.7, 0.9]
+            .map(|share| free(share, 0.0, side))
+            .into_iter()
+            .fold(f64::INFINITY, f64::min)
+    });
+    // Both ways: what a gap lets see is seen on one side only.
+    let across = |side| move |turn: &f64| free(0.5, *turn, side).min(free(0.5, -turn, -side));
+    let oblique = [30.0, 37.5, 45.0, 52.5, 60.0];
+    let farthest = [1.0, -1.0]
+        .into_iter()
+        .flat_map(|side| oblique.iter().map(across(side)))
+        .fold(0.0, f64::max);
+    let along = along[0].max(along[1]);
+    farthest <= along * SLACK
 }
 
 /// What is near enough to enter any cell of the grid, whichever way it lies, seen from the centre
@@ -162,11 +257,12 @@ fn seen(
     scene: &Scene,
     frame: Frame,
     kind: Option<ParkingType>,
+    mouth: f64,
     precision: Precision,
 ) -> Result<SpotGuess, ObstacleError> {
     let view = frame.view();
     let obstacles = scene.geometry_by(|p| precision.point(view(p)))?;
-    Ok(SpotGuess { frame, kind, obstacles })
+    Ok(SpotGuess { frame, kind, obstacles, mouth })
 }
 
 /// The largest free lane beside the spot, if there is one.
