@@ -123,6 +123,7 @@ fn blank_row(case: &Case, method: &str, plan_time_s: f64) -> Row {
         route: String::new(),
         cost_over_best: None,
         changes_over_fewest: None,
+        way_clearance_m: None,
     }
 }
 
@@ -151,14 +152,11 @@ fn describe(
     row.max_abs_steer_rad = Some(vehicle.steer(path.max_abs_curvature()));
     row.mean_abs_steer_change_rad = Some(path.mean_abs_steer_change(vehicle));
     let file = PathFile::new(&case.scene, &problem.frame, path, &row.method);
-    let checked = match result.covered {
-        None => oracle::check(&case.scene, &file),
-        Some(_) => oracle::check_cover(&case.scene, &file, PARKED_COVER),
-    };
-    match checked {
+    match oracle::measure(&case.scene, &file, result.covered.map(|_| PARKED_COVER)) {
         Ok(clearance) => {
             row.ok = true;
-            row.min_clearance_m = Some(clearance).filter(|c| c.is_finite());
+            row.min_clearance_m = Some(clearance.least).filter(|c| c.is_finite());
+            row.way_clearance_m = clearance.on_the_way.filter(|c| c.is_finite());
             row.checked = "ok".to_owned();
         }
         Err(violation) => {

@@ -3,11 +3,12 @@
 //! Reading order: a [`Method`] is built from [`Models`]; [`episode`] runs one method on
 //! one scene, exports the path ([`export`]) and has it checked by the independent
 //! [`oracle`]; [`suite`] does so for all; [`rows`] are saved; [`metrics`] summarises them,
-//! [`quality`] compares their paths, [`table`] lays them out beside the paper's, [`report`] writes them down, and [`html`] with
+//! [`quality`] compares their paths, [`clearance`] says how much room they leave, [`table`] lays them out beside the paper's, [`report`] writes them down, and [`html`] with
 //! plots and a gallery of the paths that [`trace`] kept. [`draw`] makes pictures of scenes and
 //! paths, [`trajectory_file`] puts a path in time. [`learning_curve`] is what experiments add: how much data is enough.
 
 pub mod by_vehicle;
+pub mod clearance;
 pub mod draw;
 pub mod episode;
 pub mod export;

@@ -142,16 +142,35 @@ pub enum Violation {
     },
 }
 
+/// The part of a path that is not on the way: so far after the start and before the goal, metres for
+/// the default vehicle. There the distances are given.
+pub const WAY_ENDS: f64 = 1.0;
+
+/// Smallest distances between footprint and obstacles, metres: infinite without obstacles, 0 on
+/// contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clearance {
+    /// Along the whole path.
+    pub least: f64,
+    /// Without the [`WAY_ENDS`]; `None` where nothing is left of the path.
+    pub on_the_way: Option<f64>,
+}
+
 /// Checks a path file against its scene. Returns the smallest distance between footprint
 /// and obstacles, metres (infinite without obstacles, 0 on contact).
 pub fn check(scene: &Scene, path: &PathFile) -> Result<f64, Violation> {
-    Oracle::new(scene).check(path, None)
+    measure(scene, path, None).map(|c| c.least)
+}
+
+/// [`check`], or [`check_cover`] where a share is given, with all that it measures.
+pub fn measure(scene: &Scene, path: &PathFile, share: Option<f64>) -> Result<Clearance, Violation> {
+    Oracle::new(scene).check(path, share)
 }
 
 /// [`check`] for a path that need not end at the goal, but where at least `share` of the parked
 /// footprint is covered.
 pub fn check_cover(scene: &Scene, path: &PathFile, share: f64) -> Result<f64, Violation> {
-    Oracle::new(scene).check(path, Some(share))
+    measure(scene, path, Some(share)).map(|c| c.least)
 }
 
 /// A rear-axle pose in local coordinates.
@@ -180,6 +199,12 @@ impl State {
         let turn = self.heading - other.heading;
         ((self.position - other.position).length(), (turn - TAU * (turn / TAU).round()).abs())
     }
+}
+
+/// The arc over a chord: c = 2/κ · sin(κ s / 2).
+fn arc(curvature: f64, chord: f64) -> f64 {
+    let half = curvature.abs() * chord / 2.0;
+    if half < 1e-8 { chord } else { 2.0 / curvature.abs() * half.min(1.0).asin() }
 }
 
 /// An axis-aligned box.
@@ -334,7 +359,7 @@ impl Oracle {
         }
     }
 
-    fn check(&self, path: &PathFile, share: Option<f64>) -> Result<f64, Violation> {
+    fn check(&self, path: &PathFile, share: Option<f64>) -> Result<Clearance, Violation> {
         let n = path.poses.len();
         if n == 0 || path.gears.len() != n || path.steer.len() != n {
             return Err(Violation::Shape {
@@ -359,18 +384,27 @@ impl Oracle {
         }
         self.end(state(n - 1), share)?;
         let step = CHECK_STEP * (self.vehicle.length / CHECK_LENGTH).min(1.0);
-        let mut clearance = f64::INFINITY;
+        let curvature = |i: usize| path.steer[i].tan() / self.vehicle.wheelbase;
+        let chord = |i: usize| (state(i + 1).position - state(i).position).length();
+        let length: f64 = (0..n - 1).map(|i| arc(curvature(i), chord(i))).sum();
+        let ends = WAY_ENDS * self.vehicle.scale();
+        let way = ends..=length - ends;
+        let (mut driven, mut at_ends, mut on_the_way) = (0.0, f64::INFINITY, f64::INFINITY);
         for i in 0..n - 1 {
             let (curvature, s) =
                 self.motion(i, state(i), state(i + 1), path.gears[i], path.steer[i])?;
             let steps = (self.corner_motion(curvature, s) / step).ceil().max(1.0) as usize;
             for k in 0..steps {
-                let at = state(i).driven(curvature, s * k as f64 / steps as f64);
-                self.footprint(i, at, &mut clearance)?;
+                let part = s * k as f64 / steps as f64;
+                let is_way = way.contains(&(driven + part.abs()));
+                let clearance = if is_way { &mut on_the_way } else { &mut at_ends };
+                self.footprint(i, state(i).driven(curvature, part), clearance)?;
             }
+            driven += s.abs();
         }
-        self.footprint(n - 1, state(n - 1), &mut clearance)?;
-        Ok(clearance)
+        self.footprint(n - 1, state(n - 1), &mut at_ends)?;
+        let least = at_ends.min(on_the_way);
+        Ok(Clearance { least, on_the_way: (!way.is_empty()).then_some(on_the_way) })
     }
 
     /// How far the rear axle drives, or half of how far any corner may move, whichever is more.
@@ -417,10 +451,7 @@ impl Oracle {
         if along * f64::from(gear) < -(MOTION_TOL + self.rounding) {
             return Err(Violation::Gear { pose, gear });
         }
-        // The arc over a chord: c = 2/κ · sin(κ s / 2).
-        let half = curvature.abs() * chord / 2.0;
-        let arc = if half < 1e-8 { chord } else { 2.0 / curvature.abs() * half.min(1.0).asin() };
-        let s = arc * f64::from(gear);
+        let s = arc(curvature, chord) * f64::from(gear);
         let (metres, rad) = from.driven(curvature, s).apart(to);
         // A chord that is a little too long turns a little too far.
         let turn = self.rounding * curvature.abs();

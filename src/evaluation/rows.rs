@@ -59,11 +59,14 @@ pub struct Row {
     pub cost_over_best: Option<f64>,
     /// Gear changes beyond the fewest of any method in the scene.
     pub changes_over_fewest: Option<u32>,
+    /// Smallest distance to an obstacle on the way, from 1 m after the start to 1 m before the goal
+    /// (for the default vehicle), metres; empty without obstacles, and where the path is shorter.
+    pub way_clearance_m: Option<f64>,
 }
 
 impl Row {
     /// Names of the columns, in order.
-    pub const COLUMNS: [&'static str; 18] = [
+    pub const COLUMNS: [&'static str; 19] = [
         "scene",
         "type",
         "level",
@@ -82,10 +85,17 @@ impl Row {
         "route",
         "cost_over_best",
         "changes_over_fewest",
+        "way_clearance_m",
     ];
 
-    /// How many columns at the end compare a row with others. Files of before have none of them.
-    pub const COMPARING: usize = 2;
+    /// How many columns at the end were added to the format later, as many at once: files of before
+    /// are without them.
+    const ADDED: [usize; 2] = [2, 1];
+
+    /// The columns that files of before may be without.
+    pub fn added() -> &'static [&'static str] {
+        &Self::COLUMNS[Self::COLUMNS.len() - Self::ADDED.iter().sum::<usize>()..]
+    }
 
     /// Whether the method is made for such scenes. Rows of one that is not are kept, but they
     /// are no failures and enter no table.
@@ -118,7 +128,7 @@ impl Row {
     }
 
     /// The values as text, in the order of [`Row::COLUMNS`].
-    pub fn fields(&self) -> [String; 18] {
+    pub fn fields(&self) -> [String; 19] {
         fn text<T: ToString>(v: &Option<T>) -> String {
             v.as_ref().map(T::to_string).unwrap_or_default()
         }
@@ -141,6 +151,7 @@ impl Row {
             self.route.clone(),
             text(&self.cost_over_best),
             text(&self.changes_over_fewest),
+            text(&self.way_clearance_m),
         ]
     }
 
@@ -178,6 +189,7 @@ impl Row {
             route: f[15].clone(),
             cost_over_best: maybe(f, 16)?,
             changes_over_fewest: maybe(f, 17)?,
+            way_clearance_m: maybe(f, 18)?,
         })
     }
 }
@@ -258,8 +270,12 @@ pub fn read_csv(path: &Path) -> Result<Vec<Row>, RowsError> {
         if i == 0 {
             let is_header =
                 |less: &usize| line == Row::COLUMNS[..Row::COLUMNS.len() - less].join(",");
-            missing = [0, Row::COMPARING]
-                .into_iter()
+            let last = [0].into_iter().chain(Row::ADDED.into_iter().rev());
+            missing = last
+                .scan(0, |less, added| {
+                    *less += added;
+                    Some(*less)
+                })
                 .find(is_header)
                 .ok_or_else(|| format("expected the header of a rows.csv".to_owned()))?;
             continue;
@@ -305,6 +321,7 @@ pub fn write_parquet(path: &Path, rows: &[Row]) -> Result<(), RowsError> {
         text(|r| Some(r.route.clone())),
         number(|r| r.cost_over_best),
         count(|r| r.changes_over_fewest),
+        number(|r| r.way_clearance_m),
     ];
     let named = Row::COLUMNS.into_iter().zip(columns).map(|(name, column)| (name, column, true));
     let batch = RecordBatch::try_from_iter_with_nullable(named)
@@ -368,6 +385,7 @@ mod tests {
             route: "fallback".into(),
             cost_over_best: Some(1.0 + 1.0 / 3.0),
             changes_over_fewest: Some(1),
+            way_clearance_m: Some(0.1 + 0.2),
         }
     }
 
@@ -378,10 +396,17 @@ mod tests {
         write_csv(&path, &[row(), row()]).unwrap();
         assert_eq!(read_csv(&path).unwrap(), [row(), row()]);
         let text = std::fs::read_to_string(&path).unwrap();
-        let kept = |line: &str| line.rsplitn(3, ',').nth(2).unwrap().to_owned() + "\n";
-        std::fs::write(&path, text.lines().map(kept).collect::<String>()).unwrap();
-        let before = Row { cost_over_best: None, changes_over_fewest: None, ..row() };
-        assert_eq!(read_csv(&path).unwrap(), [before.clone(), before]);
+        let without = |last: usize| {
+            let kept =
+                |line: &str| line.rsplitn(last + 1, ',').nth(last).unwrap().to_owned() + "\n";
+            std::fs::write(&path, text.lines().map(kept).collect::<String>()).unwrap();
+            read_csv(&path)
+        };
+        let before = Row { way_clearance_m: None, ..row() };
+        assert_eq!(without(1).unwrap(), [before.clone(), before.clone()]);
+        let before = Row { cost_over_best: None, changes_over_fewest: None, ..before };
+        assert_eq!(without(3).unwrap(), [before.clone(), before]);
+        assert!(without(2).unwrap_err().to_string().contains("header"));
         std::fs::write(&path, text.replace(",changes_over_fewest", "")).unwrap();
         assert!(read_csv(&path).unwrap_err().to_string().contains("header"));
     }

@@ -51,6 +51,8 @@ const TO_AND_FRO: f64 = 4.0;
 /// many expansions.
 const DOUBTFUL: f64 = 2.0;
 const SECOND_SEARCH: usize = 1500;
+/// The same by a spot that no cell of the model stands for: its manoeuvres may not be made for it.
+const UNUSUAL_SEARCH: usize = 20_000;
 /// Expansions for something better than a plan that was known.
 const PATIENCE: usize = 400;
 /// Where the lane begins farther out than this beyond a usual spot's, metres for the default vehicle,
@@ -418,8 +420,9 @@ impl GuidedPlanner {
         let model = self.hars.cost(&problem.vehicle);
         let cost = |path: &Path| model.path(&problem.vehicle, &path.segments);
         let doubtful = refined.direction_changes() > 2 && cost(&refined) > DOUBTFUL * least;
-        if doubtful || self.is_unusually_dear(problem, goal, cost(&refined), least) {
-            let share = SECOND_SEARCH.min(*left);
+        let is_dear = self.is_unusually_dear(problem, goal, cost(&refined), least);
+        if doubtful || is_dear {
+            let share = if is_dear { UNUSUAL_SEARCH } else { SECOND_SEARCH }.min(*left);
             let mut spend = share;
             let found = self.hars.search(problem, problem.start, goal, None, &mut spend);
             *left -= share - spend;

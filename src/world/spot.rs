@@ -183,7 +183,7 @@ fn found(scene: &Scene, kinds: &[ParkingType], precision: Precision) -> Option<F
 
 /// A usual lane that begins at most so much farther out than usual is one, metres for the default
 /// vehicle: bays end there where the car stands a little deeper, or its neighbours less deep.
-const TRUSTED: f64 = 1.0;
+const TRUSTED: f64 = 0.3;
 
 /// Whether no oblique direction leads farther from the middle of the lane than one along it.
 fn is_along(seen: &Surroundings, lane: &Abstraction, grid: &Grid) -> bool {
