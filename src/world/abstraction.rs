@@ -119,34 +119,44 @@ impl Surroundings {
     pub fn abstractions(&self, kind: ParkingType, grid: &Grid) -> Vec<Abstraction> {
         let mut found = self.lanes(kind, grid);
         // No straight leads from a lane farther out into a parallel spot: no cell's manoeuvre fits.
+        if found.is_empty() && kind.is_bay() {
+            found = self.lanes_farther_out(kind, grid);
+        }
         found.retain(|lane| lane.shift == 0.0 || kind.is_bay());
         found
     }
 
-    /// The lanes beside the spot, largest first, also those that begin farther out than the cells
-    /// of a parallel spot.
+    /// The lanes that begin about where they usually do beside a spot, largest first.
     pub fn lanes(&self, kind: ParkingType, grid: &Grid) -> Vec<Abstraction> {
-        // What could enter a cell, or bounds the spot.
-        let floor = -grid.lane_boundary(kind);
-        let most = MAX_SHIFT * grid.bay_depth;
-        let top = grid.lane_boundary(kind) + most + grid.lane_width.max;
-        let is_near = |(a, b): &(Vec2, Vec2)| a.y.max(b.y) > floor && a.y.min(b.y) < top;
-        let edges: Vec<_> = self.edges.iter().copied().filter(is_near).collect();
+        let edges = self.near(kind, grid);
         let low = bottom_shift(&edges, kind, grid);
-        let at =
-            |shift| if shift <= most { at_shift(&edges, kind, grid, shift) } else { Vec::new() };
-        let mut found = at(low);
-        if found.is_empty() {
-            let row = self.protrusion(kind, grid).max(low);
-            if row > low && row <= USUAL_SHIFT * grid.bay_depth {
-                found = at(row);
+        let most = USUAL_SHIFT * grid.bay_depth;
+        for shift in [low, self.protrusion(kind, grid).max(low)] {
+            if shift <= most {
+                let found = at_shift(&edges, kind, grid, shift);
+                if !found.is_empty() {
+                    return found;
+                }
             }
         }
-        if found.is_empty() {
-            let steps = farther_out(&edges, kind, grid, low);
-            found = steps.into_iter().map(at).find(|lanes| !lanes.is_empty()).unwrap_or_default();
-        }
-        found
+        Vec::new()
+    }
+
+    /// The lanes that begin as little farther out as there is one, largest first.
+    pub fn lanes_farther_out(&self, kind: ParkingType, grid: &Grid) -> Vec<Abstraction> {
+        let edges = self.near(kind, grid);
+        let low = bottom_shift(&edges, kind, grid);
+        let shifts = farther_out(&edges, kind, grid, low).into_iter();
+        let mut found = shifts.map(|shift| at_shift(&edges, kind, grid, shift));
+        found.find(|lanes| !lanes.is_empty()).unwrap_or_default()
+    }
+
+    /// What could enter a cell, or bounds the spot.
+    fn near(&self, kind: ParkingType, grid: &Grid) -> Vec<(Vec2, Vec2)> {
+        let floor = -grid.lane_boundary(kind);
+        let top = grid.lane_boundary(kind) + MAX_SHIFT * grid.bay_depth + grid.lane_width.max;
+        let is_near = |(a, b): &(Vec2, Vec2)| a.y.max(b.y) > floor && a.y.min(b.y) < top;
+        self.edges.iter().copied().filter(is_near).collect()
     }
 
     /// How far polygons and points of the spot's own row stand out into the lane.

@@ -13,8 +13,8 @@
 //! through and that may end beside the spot, and a spot in which it just stands. A parking type given
 //! with the scene leaves only its two directions to choose from.
 //!
-//! A lane that begins farther out than usual may be no more than the corner between slanted rows. It
-//! is one where no other direction leads farther than along it; oblique bays so have no type.
+//! What looks like a lane may be no more than the room before slanted bays. It is one where no oblique
+//! direction leads farther than along it; oblique bays so have no type.
 
 use super::abstraction::{Abstraction, Surroundings, abstractions};
 use super::cell::{Axis, Grid};
@@ -149,41 +149,54 @@ struct Found {
     mouth: f64,
 }
 
+/// How little may do for a spot beside a lane.
+#[derive(Clone, Copy, PartialEq)]
+enum Demand {
+    /// A usual lane and a usual spot, the lane about where it begins as a rule.
+    Usual,
+    /// The same, but the lane may begin farther out.
+    FartherOut,
+    /// See [`least_grid`].
+    Least,
+}
+
 /// The likeliest spot of one of `kinds`: the car stands in its lane rather than elsewhere, and the
-/// lane is large. Usual ones first.
+/// lane is large. Where there is a usual one, others do not count.
 fn found(scene: &Scene, kinds: &[ParkingType], precision: Precision) -> Option<Found> {
     let near = around_goal(scene, precision);
-    let usual = grid(scene);
-    let views = kinds.iter().flat_map(|&kind| {
-        let frame = spot_frame(scene, kind);
-        [frame, other_way(&frame, kind)].map(|frame| {
+    [Demand::Usual, Demand::FartherOut, Demand::Least]
+        .into_iter()
+        .find_map(|demand| likeliest(scene, &near, kinds, demand))
+}
+
+fn likeliest(
+    scene: &Scene,
+    near: &Surroundings,
+    kinds: &[ParkingType],
+    demand: Demand,
+) -> Option<Found> {
+    let mut best: Option<((bool, f64), Found)> = None;
+    for &kind in kinds {
+        let grid = if demand == Demand::Least { least_grid(scene, kind) } else { grid(scene) };
+        let usual = spot_frame(scene, kind);
+        for frame in [usual, other_way(&usual, kind)] {
             let seen = near.map(|p| from_parked(p, kind, frame.mirrored));
-            (kind, frame, seen)
-        })
-    });
-    let views: Vec<_> = views.collect();
-    let best = |grid: &dyn Fn(ParkingType) -> Grid, trusted: f64| {
-        let mut best: Option<((bool, f64), Found)> = None;
-        for &(kind, frame, ref seen) in &views {
-            let grid = grid(kind);
-            let Some(lane) = seen.lanes(kind, &grid).first().copied() else { continue };
-            let far = lane.shift > trusted * scene.vehicle.scale();
-            if far && !is_along(seen, &lane, &grid) {
-                continue;
+            let mut lanes = Vec::new();
+            if demand != Demand::FartherOut {
+                lanes = seen.lanes(kind, &grid);
             }
-            let merit = merit(&lane, &grid, frame.local_from_world(scene.start));
-            if best.is_none_or(|(most, _)| merit > most) {
+            if demand != Demand::Usual && lanes.is_empty() {
+                lanes = seen.lanes_farther_out(kind, &grid);
+            }
+            let Some(lane) = lanes.first() else { continue };
+            let merit = merit(lane, &grid, frame.local_from_world(scene.start));
+            if best.is_none_or(|(most, _)| merit > most) && is_along(&seen, lane, &grid) {
                 best = Some((merit, Found { frame, kind, mouth: lane.shift }));
             }
         }
-        best.map(|(_, found)| found)
-    };
-    best(&|_| usual, TRUSTED).or_else(|| best(&|kind| least_grid(scene, kind), -1.0))
+    }
+    best.map(|(_, found)| found)
 }
-
-/// A usual lane that begins at most so much farther out than usual is one, metres for the default
-/// vehicle: bays end there where the car stands a little deeper, or its neighbours less deep.
-const TRUSTED: f64 = 0.3;
 
 /// Whether no oblique direction leads farther from the middle of the lane than one along it.
 fn is_along(seen: &Surroundings, lane: &Abstraction, grid: &Grid) -> bool {
@@ -204,6 +217,10 @@ fn is_along(seen: &Surroundings, lane: &Abstraction, grid: &Grid) -> bool {
             .into_iter()
             .fold(f64::INFINITY, f64::min)
     });
+    let along = along[0].max(along[1]);
+    if along >= ENDLESS * grid.back {
+        return true;
+    }
     // Both ways: what a gap lets see is seen on one side only.
     let across = |side| move |turn: &f64| free(0.5, *turn, side).min(free(0.5, -turn, -side));
     let oblique = [30.0, 37.5, 45.0, 52.5, 60.0];
@@ -211,7 +228,6 @@ fn is_along(seen: &Surroundings, lane: &Abstraction, grid: &Grid) -> bool {
         .into_iter()
         .flat_map(|side| oblique.iter().map(across(side)))
         .fold(0.0, f64::max);
-    let along = along[0].max(along[1]);
     farthest <= along * SLACK
 }
 
