@@ -95,6 +95,7 @@ fn unusual_bays_are_what_they_are() {
 
 #[test]
 fn oblique_bays_have_no_type() {
+    let mut failed = false;
     for unusual in [Unusual::At45, Unusual::At60] {
         let (mut typed, mut all) = (0, 0);
         for &side in unusual.kinds() {
@@ -107,8 +108,9 @@ fn oblique_bays_have_no_type() {
             }
         }
         println!("{}: {typed} of {all}", unusual.name());
-        assert!(50 * typed <= all, "{typed} of {all} {} bays have a type", unusual.name());
+        failed |= 50 * typed > all;
     }
+    assert!(!failed, "see above");
 }
 
 #[test]

@@ -104,6 +104,22 @@ impl Surroundings {
         free
     }
 
+    /// How far from x = 0 nothing stands between `low` and `high` in y, toward the side where that is
+    /// farther.
+    pub fn free_in_band(&self, [low, high]: [f64; 2]) -> f64 {
+        let (mut left, mut right) = (f64::INFINITY, f64::INFINITY);
+        for &(a, b) in &self.edges {
+            let Some((a, b)) = clip(a, b, 1, low, high) else { continue };
+            let (x_min, x_max) = (a.x.min(b.x), a.x.max(b.x));
+            if x_min > 0.0 {
+                right = right.min(x_min);
+            } else {
+                left = left.min(-x_max.min(0.0));
+            }
+        }
+        left.max(right)
+    }
+
     /// Adds a point.
     pub fn add_point(&mut self, p: Vec2) {
         self.edges.push((p, p));

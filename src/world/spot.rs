@@ -175,54 +175,66 @@ fn likeliest(
     kinds: &[ParkingType],
     demand: Demand,
 ) -> Option<Found> {
-    let mut best: Option<((bool, f64), Found)> = None;
-    for &kind in kinds {
+    let of_kind = |&kind: &ParkingType| {
         let grid = if demand == Demand::Least { least_grid(scene, kind) } else { grid(scene) };
         let usual = spot_frame(scene, kind);
-        for frame in [usual, other_way(&usual, kind)] {
+        // The car may come from the other side, or stand across the lane.
+        [usual, other_way(&usual, kind)].into_iter().find_map(|frame| {
             let seen = near.map(|p| from_parked(p, kind, frame.mirrored));
-            let mut lanes = Vec::new();
-            if demand != Demand::FartherOut {
-                lanes = seen.lanes(kind, &grid);
-            }
-            if demand != Demand::Usual && lanes.is_empty() {
-                lanes = seen.lanes_farther_out(kind, &grid);
-            }
-            let Some(lane) = lanes.first() else { continue };
-            let merit = merit(lane, &grid, frame.local_from_world(scene.start));
-            if best.is_none_or(|(most, _)| merit > most) && is_along(&seen, lane, &grid) {
-                best = Some((merit, Found { frame, kind, mouth: lane.shift }));
-            }
+            let lane = widest(&seen, kind, &grid, demand)?;
+            let merit = merit(&lane, &grid, frame.local_from_world(scene.start));
+            let is_lane = is_along(&seen, &lane, &grid, scene.vehicle.scale());
+            is_lane.then_some((merit, Found { frame, kind, mouth: lane.shift }))
+        })
+    };
+    let mut best: Option<((bool, f64), Found)> = None;
+    for (merit, found) in kinds.iter().filter_map(of_kind) {
+        if best.is_none_or(|(most, _)| merit > most) {
+            best = Some((merit, found));
         }
     }
     best.map(|(_, found)| found)
 }
 
+/// The largest lane that will do.
+fn widest(
+    seen: &Surroundings,
+    kind: ParkingType,
+    grid: &Grid,
+    demand: Demand,
+) -> Option<Abstraction> {
+    let usual = || seen.lanes(kind, grid).first().copied();
+    let farther_out = || seen.lanes_farther_out(kind, grid).first().copied();
+    match demand {
+        Demand::Usual => usual(),
+        Demand::FartherOut => farther_out(),
+        Demand::Least => usual().or_else(farther_out),
+    }
+}
+
 /// Whether no oblique direction leads farther from the middle of the lane than one along it.
-fn is_along(seen: &Surroundings, lane: &Abstraction, grid: &Grid) -> bool {
-    /// What is as far away as this many times the cells' lane behind counts as endless.
-    const ENDLESS: f64 = 2.0;
+fn is_along(seen: &Surroundings, lane: &Abstraction, grid: &Grid, scale: f64) -> bool {
+    /// What is as far away as this of [`REACH`] counts as endless.
+    const ENDLESS: f64 = 0.98;
     /// An oblique direction may lead a little farther.
     const SLACK: f64 = 1.1;
+    /// What stands so little into the lane on either side closes it for no one, of its width.
+    const EDGE: f64 = 0.1;
     let [area, _] = lane.regions(grid);
-    let free = |share: f64, turn: f64, side: f64| {
-        let from = Vec2::new(0.0, area.min.y + share * (area.max.y - area.min.y));
-        let (sin, cos) = turn.to_radians().sin_cos();
-        seen.free_along(from, Vec2::new(cos * side, sin), ENDLESS * grid.back)
-    };
-    // Side by side, as gaps between cars lead far, too.
-    let along = [1.0, -1.0].map(|side| {
-        [0.1, 0.3, 0.5, 0.7, 0.9]
-            .map(|share| free(share, 0.0, side))
-            .into_iter()
-            .fold(f64::INFINITY, f64::min)
-    });
-    let along = along[0].max(along[1]);
-    if along >= ENDLESS * grid.back {
+    let endless = ENDLESS * REACH * scale;
+    // In nearly the whole width, as gaps between cars lead far, too.
+    let edge = EDGE * (area.max.y - area.min.y);
+    let along = seen.free_in_band([area.min.y + edge, area.max.y - edge]);
+    if along >= endless {
         return true;
     }
+    let middle = Vec2::new(0.0, f64::midpoint(area.min.y, area.max.y));
+    let free = |turn: f64, side: f64| {
+        let (sin, cos) = turn.to_radians().sin_cos();
+        seen.free_along(middle, Vec2::new(cos * side, sin), endless)
+    };
     // Both ways: what a gap lets see is seen on one side only.
-    let across = |side| move |turn: &f64| free(0.5, *turn, side).min(free(0.5, -turn, -side));
+    let across = |side| move |turn: &f64| free(*turn, side).min(free(-turn, -side));
     let oblique = [30.0, 37.5, 45.0, 52.5, 60.0];
     let farthest = [1.0, -1.0]
         .into_iter()
@@ -231,11 +243,13 @@ fn is_along(seen: &Surroundings, lane: &Abstraction, grid: &Grid) -> bool {
     farthest <= along * SLACK
 }
 
+/// Obstacles within this of the parked centre are looked at, metres for the default vehicle: more
+/// than to the farthest corner of the largest cell.
+const REACH: f64 = 20.0;
+
 /// What is near enough to enter any cell of the grid, whichever way it lies, seen from the centre
 /// of the parked body, +x along its heading.
 fn around_goal(scene: &Scene, precision: Precision) -> Surroundings {
-    /// Metres from the parked centre: more than to the farthest corner of the largest cell.
-    const REACH: f64 = 20.0;
     let far = REACH * scene.vehicle.scale();
     let center = scene.vehicle.body_center(scene.goal);
     let view = Frame { origin_in_world: center, mirrored: false }.view();

@@ -25,7 +25,7 @@ pub(super) const ENOUGH: f64 = 1.1;
 const TO_AND_FRO: f64 = 4.0;
 /// Where the lane begins farther out than this beyond a usual spot's, metres for the default vehicle,
 /// manoeuvres are tried that end farther out, too.
-const DEEPER: f64 = 1.0;
+const DEEPER: f64 = 0.3;
 /// Those it tries where there is no such curve. Each takes some microseconds, together they take a
 /// quarter of what a search usually does; generated scenes need 24 of them at most.
 const TRIES: usize = 64;
