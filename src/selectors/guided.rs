@@ -40,6 +40,7 @@ const DOUBTFUL: f64 = 2.0;
 const SECOND_SEARCH: usize = 1500;
 /// The same by a spot that no cell of the model stands for: its manoeuvres may not be made for it.
 const UNUSUAL_SEARCH: usize = 20_000;
+const UNUSUAL_PATIENCE: usize = 3000;
 /// Expansions for something better than a plan that was known.
 const PATIENCE: usize = 400;
 
@@ -235,7 +236,7 @@ impl GuidedPlanner {
         let guidance = guidance(entry, route);
         let plain = self.hars.goal_set(problem);
         let patience = PATIENCE.max(2 * (before - *left));
-        Ok((self.hars.refine(problem, &plain, leg.path, patience, left), guidance))
+        Ok((self.refine(problem, &plain, leg.path, patience, left), guidance))
     }
 
     /// The plan by what is known: as it is where it costs little more than it must, else refined.
@@ -268,7 +269,7 @@ impl GuidedPlanner {
             let found = self.hars.search(problem, problem.start, goal, None, &mut spend);
             *left -= share - spend;
             if let Ok(leg) = found {
-                let found = self.hars.refine(problem, goal, leg.path, PATIENCE, left);
+                let found = self.refine(problem, goal, leg.path, PATIENCE, left);
                 if cost(&found) < cost(&refined) {
                     refined = found;
                 }
@@ -279,6 +280,23 @@ impl GuidedPlanner {
             guidance = Guidance { preparatory: None, route };
         }
         (refined, guidance)
+    }
+
+    /// A searched path or a better one. By an unusual spot a path of many changes is looked at for longer:
+    /// what a search finds first is mostly good, but not where so little room is left.
+    fn refine(
+        &mut self,
+        problem: &Problem,
+        goal: &GoalSet,
+        path: Path,
+        patience: usize,
+        left: &mut usize,
+    ) -> Path {
+        let refined = self.hars.refine(problem, goal, path, patience, left);
+        if refined.direction_changes() > 2 && self.is_unusual(problem) {
+            return self.hars.refine(problem, goal, refined, UNUSUAL_PATIENCE, left);
+        }
+        refined
     }
 
     /// `pose`, or one beside it, from which a curve leads to the goal, and that curve.

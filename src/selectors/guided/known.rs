@@ -171,6 +171,12 @@ impl GuidedPlanner {
     ) -> bool {
         cost > USUAL * least
             && cost > ENOUGH * self.hars.lower_bound(problem, goal)
+            && self.is_unusual(problem)
+    }
+
+    /// Whether no cell of the model stands for the spot as it is.
+    pub(super) fn is_unusual(&self, problem: &Problem) -> bool {
+        problem.kind.is_some()
             && (problem.mouth > DEEPER * problem.vehicle.scale() || self.cells(problem).is_empty())
     }
 
