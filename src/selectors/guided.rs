@@ -40,7 +40,6 @@ const DOUBTFUL: f64 = 2.0;
 const SECOND_SEARCH: usize = 1500;
 /// The same by a spot that no cell of the model stands for: its manoeuvres may not be made for it.
 const UNUSUAL_SEARCH: usize = 20_000;
-const UNUSUAL_PATIENCE: usize = 3000;
 /// Expansions for something better than a plan that was known.
 const PATIENCE: usize = 400;
 
@@ -282,8 +281,8 @@ impl GuidedPlanner {
         (refined, guidance)
     }
 
-    /// A searched path or a better one. By an unusual spot a path of many changes is looked at for longer:
-    /// what a search finds first is mostly good, but not where so little room is left.
+    /// A searched path or a better one. By an unusual spot a path of many changes is searched for once
+    /// more: what a search finds first is mostly good, but not where so little room is left.
     fn refine(
         &mut self,
         problem: &Problem,
@@ -293,10 +292,18 @@ impl GuidedPlanner {
         left: &mut usize,
     ) -> Path {
         let refined = self.hars.refine(problem, goal, path, patience, left);
-        if refined.direction_changes() > 2 && self.is_unusual(problem) {
-            return self.hars.refine(problem, goal, refined, UNUSUAL_PATIENCE, left);
+        if refined.direction_changes() <= 2 || !self.is_unusual(problem) {
+            return refined;
         }
-        refined
+        let share = UNUSUAL_SEARCH.min(*left);
+        let mut spend = share;
+        let found = self.hars.search_aside(problem, problem.start, goal, &mut spend);
+        *left -= share - spend;
+        let Ok(leg) = found else { return refined };
+        let found = self.hars.refine(problem, goal, leg.path, patience, left);
+        let model = self.hars.cost(&problem.vehicle);
+        let cost = |path: &Path| model.path(&problem.vehicle, &path.segments);
+        if cost(&found) < cost(&refined) { found } else { refined }
     }
 
     /// `pose`, or one beside it, from which a curve leads to the goal, and that curve.
