@@ -90,12 +90,12 @@ impl GuidedPlanner {
         {
             best = Some(by_manoeuvre(better));
         }
-        self.from_the_mouth(problem, &cost, best)
+        self.out_of_the_mouth(problem, &cost, best)
     }
 
     /// The best so far, or a plan by a manoeuvre that ends where a usual bay's goal would be, farther
     /// out, and the straight from there where that costs less.
-    fn from_the_mouth(
+    fn out_of_the_mouth(
         &mut self,
         problem: &Problem,
         model: &CostModel,
