@@ -37,6 +37,8 @@ pub enum Stream {
     Noise = 12,
     /// A scene of clutter.
     Clutter = 13,
+    /// An unusual bay.
+    Bay = 14,
 }
 
 /// The generator of `(seed, stream, index)`.

@@ -112,10 +112,10 @@ proptest! {
             let depths: Vec<f64> =
                 file.poses.iter().map(|&p| depth(&scene, &obstacle, p.into())).collect();
             prop_assert!(only_left(&depths), "{:?}", depths);
-            prop_assert!(oracle::check_allowing(&scene, &file, None, ALLOWED).is_ok());
+            prop_assert!(oracle::measure(&scene, &file, None, ALLOWED).is_ok());
             // Who allows no contact finds one, and so does who allows less.
             prop_assert!(oracle::check(&scene, &file).is_err());
-            prop_assert!(oracle::check_allowing(&scene, &file, None, deep / 2.0).is_err() || deep < 1e-3);
+            prop_assert!(oracle::measure(&scene, &file, None, deep / 2.0).is_err() || deep < 1e-3);
             // Apart from the obstacle touched the path is as free as any.
             let mut others = scene.clone();
             others.obstacles.pop();
@@ -138,7 +138,7 @@ proptest! {
             let depths: Vec<f64> =
                 file.poses.iter().rev().map(|&p| depth(&scene, &obstacle, p.into())).collect();
             prop_assert!(only_left(&depths), "{:?}", depths);
-            prop_assert!(oracle::check_allowing(&scene, &file, None, ALLOWED).is_ok());
+            prop_assert!(oracle::measure(&scene, &file, None, ALLOWED).is_ok());
         }
     }
 
@@ -212,7 +212,7 @@ fn no_planner_deepens_a_contact_or_returns_to_it() {
         let lengths = wrong.iter().map(|&l| Segment::straight(l)).collect();
         let path = Path { start: Pose::default(), segments: lengths };
         let file = PathFile::new(&away, &Frame::WORLD, &path, "test");
-        assert!(oracle::check_allowing(&away, &file, None, ALLOWED).is_err(), "{wrong:?}");
+        assert!(oracle::measure(&away, &file, None, ALLOWED).is_err(), "{wrong:?}");
     }
     // Straight through is no way out.
     assert_eq!(drive(&wall(true, 9.0), &[9.0]), Err(NoPath::Uncertified));

@@ -4,25 +4,47 @@ use crate::geometry::{Aabb, Pose, Vec2};
 use crate::output::PathFile;
 use crate::world::Scene;
 
-/// Smallest distance between footprint and obstacles over the poses of `path`, metres; infinite
-/// without obstacles.
-pub fn of(scene: &Scene, path: &PathFile) -> f64 {
+/// The part of a path that is not on the way: so far after the start and before the goal, metres for
+/// the default vehicle. There the distances are given.
+pub const WAY_ENDS: f64 = 1.0;
+
+/// Smallest distances between footprint and obstacles, metres: infinite without obstacles, 0 on
+/// contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clearance {
+    /// Along the whole path.
+    pub least: f64,
+    /// Without the [`WAY_ENDS`]; `None` where nothing is left of the path.
+    pub on_the_way: Option<f64>,
+}
+
+/// How near `path` comes to the obstacles of its scene, over its poses.
+pub fn of(scene: &Scene, path: &PathFile) -> Clearance {
     let body = scene.vehicle.footprint(0.0);
     let corner = |p: &[f64; 2]| Vec2::new(p[0], p[1]);
     let mut edges: Vec<[Vec2; 2]> = scene.points.iter().map(|p| [corner(p); 2]).collect();
-    for polygon in &scene.obstacles {
-        let next = polygon.iter().cycle().skip(1);
-        edges.extend(polygon.iter().zip(next).map(|(a, b)| [corner(a), corner(b)]));
+    for outline in &scene.obstacles {
+        let next = outline.iter().cycle().skip(1);
+        edges.extend(outline.iter().zip(next).map(|(a, b)| [corner(a), corner(b)]));
     }
-    let mut least = f64::INFINITY;
-    for &[x, y, heading] in &path.poses {
-        let pose = Pose::new(x, y, heading);
+    let poses: Vec<Pose> = path.poses.iter().map(|&p| p.into()).collect();
+    let mut driven = vec![0.0];
+    for pair in poses.windows(2) {
+        driven.push(driven[driven.len() - 1] + pair[0].distance(pair[1]));
+    }
+    let ends = WAY_ENDS * scene.vehicle.scale();
+    let way = ends..=driven[driven.len() - 1] - ends;
+    let (mut least, mut on_the_way) = (f64::INFINITY, f64::INFINITY);
+    for (pose, driven) in poses.into_iter().zip(driven) {
         let to_body = |p: Vec2| pose.point_to_local(p);
-        for edge in &edges {
-            least = least.min(distance(&body, edge.map(to_body)));
+        let here =
+            edges.iter().map(|e| distance(&body, e.map(to_body))).fold(f64::INFINITY, f64::min);
+        least = least.min(here);
+        if way.contains(&driven) {
+            on_the_way = on_the_way.min(here);
         }
     }
-    least
+    Clearance { least, on_the_way: (!way.is_empty()).then_some(on_the_way) }
 }
 
 /// Distance between a box and a segment.

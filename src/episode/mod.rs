@@ -4,6 +4,7 @@ mod clearance;
 mod row;
 mod spot_report;
 
+pub use clearance::{Clearance, WAY_ENDS};
 pub use row::Row;
 pub use spot_report::{SpotReport, abstraction, regions};
 
@@ -58,10 +59,10 @@ impl EpisodeConfig {
 pub struct Judge {
     /// What it says of a path that it accepts: [`Row::checked`].
     pub verdict: &'static str,
-    /// The smallest distance to an obstacle, metres, or why it refuses the path. The other
+    /// How near the path comes to obstacles, or why it refuses it. The other
     /// arguments: the share of the parked footprint that must be covered, where a path need not end
     /// exactly at the goal, and how deep start and goal may reach into obstacles, metres.
-    pub check: fn(&Scene, &PathFile, Option<f64>, f64) -> Result<f64, String>,
+    pub check: fn(&Scene, &PathFile, Option<f64>, f64) -> Result<Clearance, String>,
 }
 
 /// Nobody: the path has passed the exact swept check of [`PlanResult::certified`], and is measured.
@@ -155,6 +156,7 @@ fn blank_row(case: &Case, method: &str, plan_time_s: f64) -> Row {
         route: String::new(),
         cost_over_best: None,
         changes_over_fewest: None,
+        way_clearance_m: None,
     }
 }
 
@@ -191,7 +193,8 @@ fn describe(
     match (judge.check)(&scene, &file, share, config.allow_contact_m) {
         Ok(clearance) => {
             row.ok = true;
-            row.min_clearance_m = Some(clearance).filter(|c| c.is_finite());
+            row.min_clearance_m = Some(clearance.least).filter(|c| c.is_finite());
+            row.way_clearance_m = clearance.on_the_way.filter(|c| c.is_finite());
             row.checked = judge.verdict.to_owned();
         }
         Err(violation) => {

@@ -47,11 +47,14 @@ pub struct Row {
     pub cost_over_best: Option<f64>,
     /// Gear changes beyond the fewest of any method in the scene.
     pub changes_over_fewest: Option<u32>,
+    /// Smallest distance to an obstacle on the way, from 1 m after the start to 1 m before the goal
+    /// (for the default vehicle), metres; empty without obstacles, and where the path is shorter.
+    pub way_clearance_m: Option<f64>,
 }
 
 impl Row {
     /// Names of the columns, in order.
-    pub const COLUMNS: [&'static str; 18] = [
+    pub const COLUMNS: [&'static str; 19] = [
         "scene",
         "type",
         "level",
@@ -70,10 +73,17 @@ impl Row {
         "route",
         "cost_over_best",
         "changes_over_fewest",
+        "way_clearance_m",
     ];
 
-    /// How many columns at the end compare a row with others. Files of before have none of them.
-    pub const COMPARING: usize = 2;
+    /// How many columns at the end were added to the format later, as many at once: files of before
+    /// are without them.
+    pub(crate) const ADDED: [usize; 2] = [2, 1];
+
+    /// The columns that files of before may be without.
+    pub fn added() -> &'static [&'static str] {
+        &Self::COLUMNS[Self::COLUMNS.len() - Self::ADDED.iter().sum::<usize>()..]
+    }
 
     /// Whether the method is made for such scenes. Rows of one that is not are kept, but they
     /// are no failures and enter no table.
@@ -83,7 +93,7 @@ impl Row {
 
     /// Whether the independent check refused the path.
     pub fn is_rejected(&self) -> bool {
-        !self.checked.is_empty() && self.checked != "ok"
+        !self.ok && !self.checked.is_empty()
     }
 
     /// Why it failed, with the check's own words; empty when `ok`.
@@ -106,7 +116,7 @@ impl Row {
     }
 
     /// The values as text, in the order of [`Row::COLUMNS`].
-    pub fn fields(&self) -> [String; 18] {
+    pub fn fields(&self) -> [String; 19] {
         fn text<T: ToString>(v: &Option<T>) -> String {
             v.as_ref().map(T::to_string).unwrap_or_default()
         }
@@ -129,6 +139,7 @@ impl Row {
             self.route.clone(),
             text(&self.cost_over_best),
             text(&self.changes_over_fewest),
+            text(&self.way_clearance_m),
         ]
     }
 

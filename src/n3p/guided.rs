@@ -15,47 +15,32 @@ use serde::{Deserialize, Serialize};
 use crate::curves::{Path, Segment};
 use crate::geometry::{Pose, Vec2};
 use crate::planners::hybrid_astar::{Entry, GoalSet, Leg};
-use crate::planners::library::{Library, LibraryPlan, LibrarySearch, Verdicts};
+use crate::planners::library::{LibrarySearch, Verdicts};
 use crate::planners::{
     Budget, Effort, Guidance, HybridAStar, HybridAStarConfig, NoPath, PlanResult, Planner, Problem,
     Route,
 };
-use crate::world::ParkingType;
 use crate::world::abstraction::{Abstraction, abstractions};
 
 use crate::selectors::{Features, PoseSelector};
 
+mod known;
+
+use known::{ENOUGH, Known, Prepared};
+
 /// Expansions that the paper's two legs may spend, so that a pose just beside the feasible
 /// ones does not use up what the full search needs.
 const LEG_EXPANSIONS: usize = 5_000;
-/// Libraries kept prepared: those of the parking types of two vehicles, or of one with two margins.
-const LIBRARIES: usize = 6;
-/// Known manoeuvres, free in the scene, that `n3p` tries to join before it asks for the curve
-/// straight to the goal, and then once more for something cheaper: most plans take the first.
-const FIRST_TRIES: usize = 16;
-/// Those it tries for something cheaper than the best it found, and by which share at least.
-const BETTER: usize = 4;
-const GAIN: f64 = 0.1;
-/// A plan that costs at most so many times the estimate of the best known one (which knows nothing
-/// of joints and obstacles) or the least cost through empty space is taken as it is, unless it
-/// passes something near on its way.
-const USUAL: f64 = 1.3;
-const ENOUGH: f64 = 1.1;
 /// Who starts within so many vehicle lengths of the goal may stand within a manoeuvre.
 const NEAR_GOAL: f64 = 2.0;
 /// Who starts within so many does so as a rule.
 const AT_THE_SPOT: f64 = 1.0;
-/// Changes of gear that a parallel spot may take more than the curve through empty space.
-const TO_AND_FRO: f64 = 4.0;
 /// A refined plan that still costs so many times the least is searched for once more, within so
 /// many expansions.
 const DOUBTFUL: f64 = 2.0;
 const SECOND_SEARCH: usize = 1500;
-/// Those it tries where there is no such curve. Each takes some microseconds, together they take a
-/// quarter of what a search usually does; generated scenes need 24 of them at most.
-const TRIES: usize = 64;
-/// Those that it tries to join by a long way round, where no other plan was found.
-const LONG_WAYS: usize = 8;
+/// The same by a spot that no cell of the model stands for: its manoeuvres may not be made for it.
+const UNUSUAL_SEARCH: usize = 20_000;
 
 /// What `n3p` tries before it searches. The paper's rows have no such settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -154,70 +139,6 @@ impl GuidedPlanner {
         }
     }
 
-    /// The cheapest of what is known without a search: manoeuvres of the library prepared last, and
-    /// the curve straight to the goal where none of the first can be joined.
-    fn look_up(&mut self, problem: &Problem, goal: &GoalSet) -> Option<Known> {
-        let Self { libraries, library_search, verdicts, hars, .. } = self;
-        let cost = hars.cost(&problem.vehicle);
-        let Prepared { library, straights, .. } = &libraries[0];
-        verdicts.clear();
-        let any = f64::INFINITY;
-        let mut look_up = library_search.look_up(library, verdicts, problem, &cost, any);
-        let (manoeuvre, curve) = look_up.least_estimates(*straights);
-        // Into a bay a curve may lead straight; a parallel spot takes some to and fro as a rule.
-        let to_and_fro = match problem.kind {
-            Some(ParkingType::Parallel) => TO_AND_FRO * cost.gear_change,
-            _ => 0.0,
-        };
-        let least = manoeuvre.min(curve + to_and_fro);
-        let by_manoeuvre = |plan: LibraryPlan| {
-            let is_straight = plan.manoeuvre >= *straights;
-            let preparatory = (!is_straight).then_some(plan.preparatory);
-            let route = if is_straight { Route::Direct } else { Route::Library };
-            let guidance = Guidance { preparatory, route };
-            Known { path: plan.path, cost: plan.cost, guidance, least }
-        };
-        let mut best = look_up.next(any, FIRST_TRIES).map(by_manoeuvre);
-        if best.is_none() {
-            let guidance = Guidance { preparatory: None, route: Route::Direct };
-            let direct = hars.direct(problem, problem.start, goal);
-            let direct = direct.map(|Leg { path, cost, .. }| Known { path, cost, guidance, least });
-            let bound = direct.as_ref().map_or(any, |known| known.cost);
-            let tries = if direct.is_some() { FIRST_TRIES } else { TRIES };
-            best = look_up.next(bound, tries).map(by_manoeuvre).or(direct);
-            best = best.or_else(|| look_up.long_way(any, LONG_WAYS).map(by_manoeuvre));
-        }
-        // What is estimated to cost less than the best so far may do so.
-        while let Some(known) = &best
-            && let Some(better) = look_up.next(known.cost * (1.0 - GAIN), BETTER)
-        {
-            best = Some(by_manoeuvre(better));
-        }
-        best
-    }
-
-    /// Puts the library for `problem` first, prepared if need be, and says whether there is one.
-    fn prepare_library(&mut self, problem: &Problem) -> bool {
-        let Some(kind) = problem.kind else { return false };
-        let fits = |p: &Prepared| p.kind == kind && p.library.fits(problem);
-        match self.libraries.iter().position(fits) {
-            Some(at) => self.libraries[..=at].rotate_right(1),
-            None => {
-                let (vehicle, footprint) = (&problem.vehicle, *problem.collision.footprint());
-                let manoeuvres = self.selector.manoeuvres(kind, vehicle);
-                let cost = self.hars.cost(vehicle);
-                let mut library = Library::new(&manoeuvres, vehicle, footprint, &cost);
-                let straights = library.len();
-                for entry in self.hars.entry_straights(problem) {
-                    library.add(entry, &cost);
-                }
-                self.libraries.truncate(LIBRARIES - 1);
-                self.libraries.insert(0, Prepared { kind, library, straights });
-            }
-        }
-        self.libraries[0].straights > 0
-    }
-
     /// The cells found around the spot, the largest first.
     fn cells(&self, problem: &Problem) -> Vec<Abstraction> {
         let of_kind = |kind| abstractions(&problem.obstacles, kind, self.selector.grid());
@@ -274,7 +195,7 @@ impl GuidedPlanner {
         effort: Effort,
         left: &mut usize,
     ) -> Result<(Path, Guidance), NoPath> {
-        let mut goal = self.hars.goal_set(problem);
+        let mut goal = self.hars.goal_set_of_cell(problem, problem.mouth);
         let has_library = config.library && self.prepare_library(problem);
         if has_library && let Some(known) = self.look_up(problem, &goal) {
             return Ok(self.settle(problem, &goal, known, effort, left));
@@ -314,29 +235,7 @@ impl GuidedPlanner {
         let guidance = guidance(entry, route);
         let plain = self.hars.goal_set(problem);
         let spent = before - *left;
-        Ok((self.hars.refine(problem, &plain, leg.path, effort, spent, left), guidance))
-    }
-
-    /// Whether a plan costs no more than usual: what is known of the spot says what it takes; where
-    /// that is little, the curve through empty space does.
-    fn is_usual(&mut self, problem: &Problem, goal: &GoalSet, known: &Known) -> bool {
-        known.cost <= USUAL * known.least
-            || known.cost <= ENOUGH * self.hars.lower_bound(problem, goal)
-    }
-
-    /// What is known, or the rest of the manoeuvre that the car stands in where that costs less: who
-    /// replans on the way goes on.
-    fn or_rest(&mut self, problem: &Problem, known: Known) -> Known {
-        let library = self.libraries.first().map(|p| &p.library).filter(|l| l.fits(problem));
-        let Some(library) = library else { return known };
-        let model = self.hars.cost(&problem.vehicle);
-        match library.rest(problem, &model) {
-            Some((path, cost)) if cost < known.cost => {
-                let guidance = Guidance { preparatory: None, route: Route::Library };
-                Known { path, cost, guidance, least: known.least }
-            }
-            _ => known,
-        }
+        Ok((self.refine(problem, &plain, leg.path, effort, spent, left), guidance))
     }
 
     /// The plan by what is known: as it is where it costs little more than it must, else refined.
@@ -365,13 +264,15 @@ impl GuidedPlanner {
         let mut refined = self.hars.refine(problem, goal, path.clone(), Effort::Usual, 0, left);
         let model = self.hars.cost(&problem.vehicle);
         let cost = |path: &Path| model.path(&problem.vehicle, &path.segments);
-        if refined.direction_changes() > 2 && cost(&refined) > DOUBTFUL * least {
-            let share = SECOND_SEARCH.min(*left);
+        let doubtful = refined.direction_changes() > 2 && cost(&refined) > DOUBTFUL * least;
+        let is_dear = self.is_unusually_dear(problem, goal, cost(&refined), least);
+        if doubtful || is_dear {
+            let share = if is_dear { UNUSUAL_SEARCH } else { SECOND_SEARCH }.min(*left);
             let mut spend = share;
             let found = self.hars.search(problem, problem.start, goal, None, &mut spend);
             *left -= share - spend;
             if let Ok(leg) = found {
-                let found = self.hars.refine(problem, goal, leg.path, Effort::Usual, 0, left);
+                let found = self.refine(problem, goal, leg.path, Effort::Usual, 0, left);
                 if cost(&found) < cost(&refined) {
                     refined = found;
                 }
@@ -400,6 +301,33 @@ impl GuidedPlanner {
     fn anew(spent: usize) -> Guidance {
         let route = if spent == 0 { Route::Direct } else { Route::Searched };
         Guidance { preparatory: None, route }
+    }
+
+    /// A searched path or a better one. By an unusual spot a path of many changes is searched for once
+    /// more: what a search finds first is mostly good, but not where so little room is left.
+    fn refine(
+        &mut self,
+        problem: &Problem,
+        goal: &GoalSet,
+        path: Path,
+        effort: Effort,
+        spent: usize,
+        left: &mut usize,
+    ) -> Path {
+        let refined = self.hars.refine(problem, goal, path, effort, spent, left);
+        if effort == Effort::First || refined.direction_changes() <= 2 || !self.is_unusual(problem)
+        {
+            return refined;
+        }
+        let share = UNUSUAL_SEARCH.min(*left);
+        let mut spend = share;
+        let found = self.hars.search_aside(problem, problem.start, goal, &mut spend);
+        *left -= share - spend;
+        let Ok(leg) = found else { return refined };
+        let found = self.hars.refine(problem, goal, leg.path, effort, 0, left);
+        let model = self.hars.cost(&problem.vehicle);
+        let cost = |path: &Path| model.path(&problem.vehicle, &path.segments);
+        if cost(&found) < cost(&refined) { found } else { refined }
     }
 
     /// `pose`, or one beside it, from which a curve leads to the goal, and that curve.
@@ -445,24 +373,6 @@ impl GuidedPlanner {
         let guidance = Guidance { preparatory: None, route: Route::Fallback };
         Ok((leg.path, guidance))
     }
-}
-
-/// A library made ready for a parking type and a footprint.
-struct Prepared {
-    kind: ParkingType,
-    library: Library,
-    /// From this number on its manoeuvres are none but the straight into the spot, or nothing at
-    /// all: what joins them is the curve straight to the goal.
-    straights: usize,
-}
-
-/// A plan that took no search.
-struct Known {
-    path: Path,
-    cost: f64,
-    guidance: Guidance,
-    /// An estimate of what the best plan costs.
-    least: f64,
 }
 
 /// A path and how it came about, or none.

@@ -12,7 +12,7 @@
 
 use crate::curves::reeds_shepp::Word;
 use crate::curves::{Path, Segment};
-use crate::geometry::Pose;
+use crate::geometry::{Aabb, Pose};
 use crate::vehicle::Vehicle;
 
 use super::analytic::{AnalyticExpansion, AnalyticTail, lower_bound};
@@ -180,10 +180,39 @@ impl HybridAStar {
         direct: Option<Leg>,
         expansions: &mut usize,
     ) -> Result<Leg, NoPath> {
-        let mut best = direct;
         let config = self.config.for_search(&problem.vehicle)?;
         let domains = config.domains(problem, start, goal.pose);
-        let result = config.coarse_to_fine(&domains, expansions, |attempt, expansions| {
+        self.search_in(&domains, problem, start, goal, direct, expansions)
+    }
+
+    /// [`HybridAStar::search`] on lattices that lie half a cell aside: of two first solutions in a tight
+    /// place one may be much the better.
+    pub(crate) fn search_aside(
+        &mut self,
+        problem: &Problem,
+        start: Pose,
+        goal: &GoalSet,
+        expansions: &mut usize,
+    ) -> Result<Leg, NoPath> {
+        let config = self.config.for_search(&problem.vehicle)?;
+        let half = config.resolutions[0].cell / 2.0;
+        let mut domains = config.domains(problem, start, goal.pose);
+        domains.iter_mut().for_each(|domain| *domain = domain.inflated(half));
+        self.search_in(&domains, problem, start, goal, None, expansions)
+    }
+
+    fn search_in(
+        &mut self,
+        domains: &[Aabb],
+        problem: &Problem,
+        start: Pose,
+        goal: &GoalSet,
+        direct: Option<Leg>,
+        expansions: &mut usize,
+    ) -> Result<Leg, NoPath> {
+        let mut best = direct;
+        let config = self.config.for_search(&problem.vehicle)?;
+        let result = config.coarse_to_fine(domains, expansions, |attempt, expansions| {
             let result = self.search_leg(attempt, problem, start, goal, &mut best, expansions);
             if best.is_some() { Ok(()) } else { result }
         });

@@ -166,8 +166,8 @@ impl Manoeuvre {
     }
 }
 
-/// Which manoeuvres of a library are free in one environment, as far as it was asked: the same for
-/// every start there.
+/// Which manoeuvres of a library are free in one environment when they end at one pose, as far as it
+/// was asked: the same for every start there.
 #[derive(Clone, Debug, Default)]
 pub struct Verdicts {
     free: Vec<Option<bool>>,
@@ -181,11 +181,11 @@ impl Verdicts {
         self.suspect = None;
     }
 
-    fn is_free(&mut self, library: &Library, index: usize, problem: &Problem) -> bool {
+    fn is_free(&mut self, library: &Library, index: usize, problem: &Problem, end: Pose) -> bool {
         // The library may have grown.
         self.free.resize(library.len(), None);
         *self.free[index].get_or_insert_with(|| {
-            let base = BodyFrame::new(problem.goal);
+            let base = BodyFrame::new(end);
             library.manoeuvres[index].is_free(&base, problem, &mut self.suspect)
         })
     }
@@ -220,6 +220,8 @@ pub struct LookUp<'a> {
     library: &'a Library,
     verdicts: &'a mut Verdicts,
     problem: &'a Problem,
+    /// Where the manoeuvres end.
+    end: Pose,
     model: &'a CostModel,
 }
 
@@ -261,9 +263,23 @@ impl LibrarySearch {
         model: &'a CostModel,
         bound: f64,
     ) -> LookUp<'a> {
+        self.look_up_at(library, verdicts, problem, problem.goal, model, bound)
+    }
+
+    /// [`LibrarySearch::look_up`] of manoeuvres that end at another pose than the goal, such as one
+    /// from which a straight leads to it. Plans end there, too.
+    pub fn look_up_at<'a>(
+        &'a mut self,
+        library: &'a Library,
+        verdicts: &'a mut Verdicts,
+        problem: &'a Problem,
+        end: Pose,
+        model: &'a CostModel,
+        bound: f64,
+    ) -> LookUp<'a> {
         debug_assert!(library.fits(problem));
-        let goal = problem.start.relative(problem.goal);
-        let mut begins = self.approaches.view(&library.begins, goal, &problem.vehicle, model);
+        let seen = problem.start.relative(end);
+        let mut begins = self.approaches.view(&library.begins, seen, &problem.vehicle, model);
         let mut queue = std::mem::take(&mut self.queue).into_vec();
         queue.clear();
         for index in 0..library.len() {
@@ -274,7 +290,7 @@ impl LibrarySearch {
         }
         self.queue = BinaryHeap::from(queue);
         self.free.clear();
-        LookUp { search: self, library, verdicts, problem, model }
+        LookUp { search: self, library, verdicts, problem, end, model }
     }
 
     /// The first plan of `problem`, in order of estimated cost, that is free and costs less
@@ -321,7 +337,7 @@ impl LookUp<'_> {
                 return None;
             }
             self.search.queue.pop();
-            if self.verdicts.is_free(self.library, candidate.index(), self.problem) {
+            if self.verdicts.is_free(self.library, candidate.index(), self.problem, self.end) {
                 self.search.free.push(candidate);
                 let window = candidate.window(self.library, self.model);
                 let plan = self.join(candidate, bound.min(window));
@@ -349,10 +365,10 @@ impl LookUp<'_> {
 
     /// The plan through a free manoeuvre, if a free curve joins it within `bound`.
     fn join(&mut self, candidate: Candidate, bound: f64) -> Option<LibraryPlan> {
-        let Self { library, problem, model, .. } = *self;
+        let Self { library, problem, end, model, .. } = *self;
         let manoeuvre = candidate.index();
         let entry = &library.manoeuvres[manoeuvre].entry;
-        let preparatory = problem.goal.compose(entry.pose);
+        let preparatory = end.compose(entry.pose);
         let (departure, bound) = (entry.departure(), bound - entry.cost());
         let (word, cost) = self.search.analytic.curve(
             problem.start,
@@ -412,7 +428,7 @@ mod tests {
                 };
                 let expected: Vec<usize> = (0..library.len()).filter(alone).collect();
                 let mut verdicts = Verdicts::default();
-                let free = |i: &usize| verdicts.is_free(&library, *i, &problem);
+                let free = |i: &usize| verdicts.is_free(&library, *i, &problem, problem.goal);
                 let found: Vec<usize> = (0..library.len()).filter(free).collect();
                 assert_eq!(found, expected);
             }

@@ -20,6 +20,9 @@ pub struct Problem {
     pub frame: Frame,
     /// How the goal lies in its spot; `None` where no spot is known.
     pub kind: Option<ParkingType>,
+    /// How much farther out the lane begins than beside a usual spot, metres: the depth that a bay
+    /// has on top of a usual one's, or what stands out into the lane.
+    pub mouth: f64,
     /// Rear-axle start, planning frame.
     pub start: Pose,
     /// Rear-axle goal, planning frame.
@@ -230,7 +233,7 @@ impl Problem {
         precision: Precision,
     ) -> Result<Problem, ProblemError> {
         scene.check_numbers()?;
-        let SpotGuess { frame, kind, obstacles } = spot::guess(scene, precision)?;
+        let SpotGuess { frame, kind, obstacles, mouth } = spot::guess(scene, precision)?;
         let bounds = scene.bounds.map(|b| spot::bounds_in_frame(b, &frame, precision));
         let start = precision.pose(frame.local_from_world(scene.start));
         let goal = match precision {
@@ -243,6 +246,7 @@ impl Problem {
         let seen =
             Self::checked(scene.vehicle, frame, kind, [start, goal], obstacles, bounds, keeping);
         let mut problem = seen?;
+        problem.mouth = mouth;
         problem.tolerance = scene.goal_tolerance.map(|tolerance| (goal, tolerance));
         Ok(problem)
     }
@@ -312,6 +316,7 @@ impl Problem {
             vehicle,
             frame,
             kind,
+            mouth: 0.0,
             start,
             goal,
             obstacles,

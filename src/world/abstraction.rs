@@ -40,8 +40,13 @@ impl Abstraction {
 /// Obstacles that only touch a region's border do not enter it.
 const TOUCH: f64 = 1e-6;
 
-/// The farthest a bay's lane may begin beyond its usual boundary, of the bay's depth.
-const MAX_SHIFT: f64 = 1.0 / 5.5;
+/// The farthest a bay's lane may begin beyond its usual boundary, of the bay's depth: a car parked
+/// at the bottom of a bay 9 m deep, or pillars and kerbs that reach as far into the lane.
+const MAX_SHIFT: f64 = 4.0 / 5.5;
+/// The same where only what stands out farthest in the row is asked for.
+const USUAL_SHIFT: f64 = 1.0 / 5.5;
+/// Farther out the lane is looked for in steps, of the bay's depth.
+const SHIFT_STEP: f64 = 0.25 / 5.5;
 
 /// The cells found around the spot, largest lane first; none where the scene has no such
 /// structure or lies below the grid.
@@ -82,6 +87,39 @@ impl Surroundings {
         self.polygons.last().map_or(0, |p| p.end)
     }
 
+    /// How far from `from` along the unit vector `along` the first obstacle is, at most `most`.
+    pub fn free_along(&self, from: Vec2, along: Vec2, most: f64) -> f64 {
+        let across = Vec2::new(-along.y, along.x);
+        let mut free = most;
+        for (a, b) in &self.edges {
+            let ((xa, ya), (xb, yb)) =
+                [a, b].map(|p| ((p - from).dot(&along), (p - from).dot(&across))).into();
+            if (ya <= 0.0) != (yb <= 0.0) {
+                let x = xa + (xb - xa) * ya / (ya - yb);
+                if x >= 0.0 {
+                    free = free.min(x);
+                }
+            }
+        }
+        free
+    }
+
+    /// How far from x = 0 nothing stands between `low` and `high` in y, toward the side where that is
+    /// farther.
+    pub fn free_in_band(&self, [low, high]: [f64; 2]) -> f64 {
+        let (mut left, mut right) = (f64::INFINITY, f64::INFINITY);
+        for &(a, b) in &self.edges {
+            let Some((a, b)) = clip(a, b, 1, low, high) else { continue };
+            let (x_min, x_max) = (a.x.min(b.x), a.x.max(b.x));
+            if x_min > 0.0 {
+                right = right.min(x_min);
+            } else {
+                left = left.min(-x_max.min(0.0));
+            }
+        }
+        left.max(right)
+    }
+
     /// Adds a point.
     pub fn add_point(&mut self, p: Vec2) {
         self.edges.push((p, p));
@@ -95,24 +133,46 @@ impl Surroundings {
 
     /// [`abstractions`] among these obstacles.
     pub fn abstractions(&self, kind: ParkingType, grid: &Grid) -> Vec<Abstraction> {
-        // What could enter a cell, or bounds the spot.
-        let floor = -grid.lane_boundary(kind);
-        let most = MAX_SHIFT * grid.bay_depth;
-        let top = grid.lane_boundary(kind) + most + grid.lane_width.max;
-        let is_near = |(a, b): &(Vec2, Vec2)| a.y.max(b.y) > floor && a.y.min(b.y) < top;
-        let edges: Vec<_> = self.edges.iter().copied().filter(is_near).collect();
-        let mut found = Vec::new();
+        let mut found = self.lanes(kind, grid);
+        // No straight leads from a lane farther out into a parallel spot: no cell's manoeuvre fits.
+        if found.is_empty() && kind.is_bay() {
+            found = self.lanes_farther_out(kind, grid);
+        }
+        found.retain(|lane| lane.shift == 0.0 || kind.is_bay());
+        found
+    }
+
+    /// The lanes that begin about where they usually do beside a spot, largest first.
+    pub fn lanes(&self, kind: ParkingType, grid: &Grid) -> Vec<Abstraction> {
+        let edges = self.near(kind, grid);
         let low = bottom_shift(&edges, kind, grid);
+        let most = USUAL_SHIFT * grid.bay_depth;
         for shift in [low, self.protrusion(kind, grid).max(low)] {
-            if shift > most || (shift > 0.0 && !kind.is_bay()) {
-                continue;
-            }
-            found = at_shift(&edges, kind, grid, shift);
-            if !found.is_empty() {
-                break;
+            if shift <= most {
+                let found = at_shift(&edges, kind, grid, shift);
+                if !found.is_empty() {
+                    return found;
+                }
             }
         }
-        found
+        Vec::new()
+    }
+
+    /// The lanes that begin as little farther out as there is one, largest first.
+    pub fn lanes_farther_out(&self, kind: ParkingType, grid: &Grid) -> Vec<Abstraction> {
+        let edges = self.near(kind, grid);
+        let low = bottom_shift(&edges, kind, grid);
+        let shifts = farther_out(&edges, kind, grid, low).into_iter();
+        let mut found = shifts.map(|shift| at_shift(&edges, kind, grid, shift));
+        found.find(|lanes| !lanes.is_empty()).unwrap_or_default()
+    }
+
+    /// What could enter a cell, or bounds the spot.
+    fn near(&self, kind: ParkingType, grid: &Grid) -> Vec<(Vec2, Vec2)> {
+        let floor = -grid.lane_boundary(kind);
+        let top = grid.lane_boundary(kind) + MAX_SHIFT * grid.bay_depth + grid.lane_width.max;
+        let is_near = |(a, b): &(Vec2, Vec2)| a.y.max(b.y) > floor && a.y.min(b.y) < top;
+        self.edges.iter().copied().filter(is_near).collect()
     }
 
     /// How far polygons and points of the spot's own row stand out into the lane.
@@ -132,12 +192,30 @@ impl Surroundings {
             }
         }
         for (p, _) in &self.edges[self.points_begin()..] {
-            if p.x > x_min && p.x < x_max && p.y < boundary + MAX_SHIFT * grid.bay_depth {
+            if p.x > x_min && p.x < x_max && p.y < boundary + USUAL_SHIFT * grid.bay_depth {
                 top = top.max(p.y);
             }
         }
         top - boundary
     }
+}
+
+/// How far out a lane may begin, farther than `low`, nearest first: just beyond something.
+fn farther_out(edges: &[(Vec2, Vec2)], kind: ParkingType, grid: &Grid, low: f64) -> Vec<f64> {
+    let boundary = grid.lane_boundary(kind);
+    let (step, most) = (SHIFT_STEP * grid.bay_depth, MAX_SHIFT * grid.bay_depth);
+    // The farthest end of something in every step.
+    let mut ends = [f64::NEG_INFINITY; (MAX_SHIFT / SHIFT_STEP) as usize + 2];
+    for &(a, b) in edges {
+        let beside = a.x.max(b.x) < -grid.back || a.x.min(b.x) > grid.dead_end.max;
+        for end in [a.y - boundary, b.y - boundary] {
+            if !beside && end > low && end <= most {
+                let end_of_step = &mut ends[(end / step) as usize];
+                *end_of_step = end_of_step.max(end);
+            }
+        }
+    }
+    ends.into_iter().filter(|end| end.is_finite()).collect()
 }
 
 /// The maximal cells whose frame lies `shift` metres along +y.

@@ -1,12 +1,14 @@
 //! The world a car parks in: scenes, collision, cells and the abstraction.
 //!
-//! In reading order: a [`Scene`] is what a user gives ([`mod@scene`] reads files, [`goals`] is where paths may end, [`mod@tpcap`] a
-//! benchmark's, [`mod@generate`] makes scenes, [`mod@clutter`] some that are no parking
+//! In reading order: a [`Scene`] is what a user gives ([`mod@scene`] reads files, [`goals`] is where
+//! paths may end, [`mod@tpcap`] a benchmark's, `generate` makes scenes, `bays` unusual ones, `clutter` some that are no parking
 //! lots); [`spot`] finds the spot frame that everything below works in; [`Obstacles`] is a scene's geometry in any frame; [`collision`] answers
 //! whether a motion is free; [`cell`] defines the abstracted environments 𝓔 of the paper and
 //! [`abstraction`] finds them in a scene.
 
 pub mod abstraction;
+#[cfg(any(test, feature = "generate"))]
+pub mod bays;
 pub mod cell;
 #[cfg(any(test, feature = "generate"))]
 pub mod clutter;

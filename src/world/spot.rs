@@ -9,11 +9,15 @@
 //! A goal alone does not say which way its lane lies: ahead of the nose (parked in reverse),
 //! behind the tail (forward) or beside the car (parallel, on either side), each travelled in one of two
 //! directions. Each of these is held against the obstacles by [`super::abstraction`]: it is possible
-//! where the smallest cell is free. A parking type given with the scene leaves only its two
-//! directions to choose from.
+//! where the smallest cell is free. Where none is, less will do: a lane that the car just passes
+//! through and that may end beside the spot, and a spot in which it just stands. A parking type given
+//! with the scene leaves only its two directions to choose from.
+//!
+//! What looks like a lane may be no more than the room before slanted bays. It is one where no oblique
+//! direction leads farther than along it; oblique bays so have no type.
 
 use super::abstraction::{Abstraction, Surroundings, abstractions};
-use super::cell::Grid;
+use super::cell::{Axis, Grid};
 use super::{ObstacleError, Obstacles, ParkingType, Scene};
 use crate::geometry::{Aabb, Frame, Pose, Vec2, segment_in_box};
 
@@ -68,31 +72,66 @@ pub struct SpotGuess {
     pub kind: Option<ParkingType>,
     /// The obstacles, seen from the frame.
     pub obstacles: Obstacles,
+    /// How much farther from the parked centre the lane begins than beside a usual spot, metres;
+    /// 0 where none was found.
+    pub mouth: f64,
 }
 
 /// The planning frame of a scene.
 pub fn guess(scene: &Scene, precision: Precision) -> Result<SpotGuess, ObstacleError> {
-    let seen = |frame, kind| seen(scene, frame, kind, precision);
+    let seen = |frame, kind, mouth| seen(scene, frame, kind, mouth, precision);
     let Some(kind) = scene.parking_type else {
-        return match found(scene, precision) {
-            Some((frame, kind)) => seen(frame, Some(kind)),
-            None => seen(goal_frame(scene), None),
+        return match found(scene, &ParkingType::ALL, precision) {
+            Some(Found { frame, kind, mouth }) => seen(frame, Some(kind), mouth),
+            None => seen(goal_frame(scene), None, 0.0),
         };
     };
     let usual = spot_frame(scene, kind);
-    let guess = seen(usual, Some(kind))?;
+    let guess = seen(usual, Some(kind), 0.0)?;
     let grid = grid(scene);
-    if lane_is_open(&guess.obstacles, kind, &grid) || lane(&guess, &grid).is_some() {
+    if lane_is_open(&guess.obstacles, kind, &grid) {
         return Ok(guess);
     }
+    if let Some(lane) = lane(&guess, &grid) {
+        return Ok(SpotGuess { mouth: lane.shift, ..guess });
+    }
     // The car may come from the other side, or stand across the lane.
-    let other = seen(other_way(&usual, kind), Some(kind))?;
-    Ok(if lane(&other, &grid).is_some() { other } else { guess })
+    let other = seen(other_way(&usual, kind), Some(kind), 0.0)?;
+    if let Some(lane) = lane(&other, &grid) {
+        return Ok(SpotGuess { mouth: lane.shift, ..other });
+    }
+    match found(scene, &[kind], precision) {
+        Some(Found { frame, mouth, .. }) => seen(frame, Some(kind), mouth),
+        None => Ok(guess),
+    }
 }
 
 /// The usual spots and lanes, for the size of the vehicle.
 fn grid(scene: &Scene) -> Grid {
     Grid::default().scaled(scene.vehicle.scale())
+}
+
+/// The least that still is a spot beside a lane: the car stands in it and passes through it, and the
+/// lane may end beside the spot.
+fn least_grid(scene: &Scene, kind: ParkingType) -> Grid {
+    /// Room on each side of the parked car, that in the lane beside it, and how far the lane
+    /// reaches back, metres for the default vehicle.
+    const ROOM: f64 = 0.02;
+    const LANE_ROOM: f64 = 1.0;
+    const BACK: f64 = 5.0;
+    let vehicle = &scene.vehicle;
+    let scale = vehicle.scale();
+    let usual = grid(scene);
+    let along = if kind.is_bay() { vehicle.width } else { vehicle.length } + 2.0 * ROOM * scale;
+    let from = |min: f64, axis: Axis| Axis { min: min.min(axis.min), ..axis };
+    Grid {
+        lane_width: from(vehicle.width + LANE_ROOM * scale, usual.lane_width),
+        bay_spot_width: from(along, usual.bay_spot_width),
+        parallel_spot_width: from(along, usual.parallel_spot_width),
+        dead_end: from(along / 2.0, usual.dead_end),
+        back: BACK * scale,
+        ..usual
+    }
 }
 
 /// The goal's own frame, mirrored where the car would start to its right.
@@ -101,30 +140,116 @@ fn goal_frame(scene: &Scene) -> Frame {
     Frame { mirrored: plain.local_from_world(scene.start).y < 0.0, ..plain }
 }
 
-/// The likeliest spot: the car stands in its lane rather than elsewhere, and the lane is large.
-fn found(scene: &Scene, precision: Precision) -> Option<(Frame, ParkingType)> {
+/// A spot beside a lane.
+#[derive(Clone, Copy)]
+struct Found {
+    frame: Frame,
+    kind: ParkingType,
+    /// See [`SpotGuess`].
+    mouth: f64,
+}
+
+/// How little may do for a spot beside a lane.
+#[derive(Clone, Copy, PartialEq)]
+enum Demand {
+    /// A usual lane and a usual spot, the lane about where it begins as a rule.
+    Usual,
+    /// The same, but the lane may begin farther out.
+    FartherOut,
+    /// See [`least_grid`].
+    Least,
+}
+
+/// The likeliest spot of one of `kinds`: the car stands in its lane rather than elsewhere, and the
+/// lane is large. Where there is a usual one, others do not count.
+fn found(scene: &Scene, kinds: &[ParkingType], precision: Precision) -> Option<Found> {
     let near = around_goal(scene, precision);
-    let grid = grid(scene);
-    let mut best: Option<((bool, f64), Frame, ParkingType)> = None;
-    for kind in ParkingType::ALL {
+    [Demand::Usual, Demand::FartherOut, Demand::Least]
+        .into_iter()
+        .find_map(|demand| likeliest(scene, &near, kinds, demand))
+}
+
+fn likeliest(
+    scene: &Scene,
+    near: &Surroundings,
+    kinds: &[ParkingType],
+    demand: Demand,
+) -> Option<Found> {
+    let of_kind = |&kind: &ParkingType| {
+        let grid = if demand == Demand::Least { least_grid(scene, kind) } else { grid(scene) };
         let usual = spot_frame(scene, kind);
-        for frame in [usual, other_way(&usual, kind)] {
+        // The car may come from the other side, or stand across the lane.
+        [usual, other_way(&usual, kind)].into_iter().find_map(|frame| {
             let seen = near.map(|p| from_parked(p, kind, frame.mirrored));
-            let Some(lane) = seen.abstractions(kind, &grid).first().copied() else { continue };
+            let lane = widest(&seen, kind, &grid, demand)?;
             let merit = merit(&lane, &grid, frame.local_from_world(scene.start));
-            if best.is_none_or(|(most, ..)| merit > most) {
-                best = Some((merit, frame, kind));
-            }
+            let is_lane = is_along(&seen, &lane, &grid, scene.vehicle.scale());
+            is_lane.then_some((merit, Found { frame, kind, mouth: lane.shift }))
+        })
+    };
+    let mut best: Option<((bool, f64), Found)> = None;
+    for (merit, found) in kinds.iter().filter_map(of_kind) {
+        if best.is_none_or(|(most, _)| merit > most) {
+            best = Some((merit, found));
         }
     }
-    best.map(|(_, frame, kind)| (frame, kind))
+    best.map(|(_, found)| found)
 }
+
+/// The largest lane that will do.
+fn widest(
+    seen: &Surroundings,
+    kind: ParkingType,
+    grid: &Grid,
+    demand: Demand,
+) -> Option<Abstraction> {
+    let usual = || seen.lanes(kind, grid).first().copied();
+    let farther_out = || seen.lanes_farther_out(kind, grid).first().copied();
+    match demand {
+        Demand::Usual => usual(),
+        Demand::FartherOut => farther_out(),
+        Demand::Least => usual().or_else(farther_out),
+    }
+}
+
+/// Whether no oblique direction leads farther from the middle of the lane than one along it.
+fn is_along(seen: &Surroundings, lane: &Abstraction, grid: &Grid, scale: f64) -> bool {
+    /// What is as far away as this of [`REACH`] counts as endless.
+    const ENDLESS: f64 = 0.98;
+    /// An oblique direction may lead a little farther.
+    const SLACK: f64 = 1.1;
+    /// What stands so little into the lane on either side closes it for no one, of its width.
+    const EDGE: f64 = 0.1;
+    let [area, _] = lane.regions(grid);
+    let endless = ENDLESS * REACH * scale;
+    // In nearly the whole width, as gaps between cars lead far, too.
+    let edge = EDGE * (area.max.y - area.min.y);
+    let along = seen.free_in_band([area.min.y + edge, area.max.y - edge]);
+    if along >= endless {
+        return true;
+    }
+    let middle = Vec2::new(0.0, f64::midpoint(area.min.y, area.max.y));
+    let free = |turn: f64, side: f64| {
+        let (sin, cos) = turn.to_radians().sin_cos();
+        seen.free_along(middle, Vec2::new(cos * side, sin), endless)
+    };
+    // Both ways: what a gap lets see is seen on one side only.
+    let across = |side| move |turn: &f64| free(*turn, side).min(free(-turn, -side));
+    let oblique = [30.0, 37.5, 45.0, 52.5, 60.0];
+    let farthest = [1.0, -1.0]
+        .into_iter()
+        .flat_map(|side| oblique.iter().map(across(side)))
+        .fold(0.0, f64::max);
+    farthest <= along * SLACK
+}
+
+/// Obstacles within this of the parked centre are looked at, metres for the default vehicle: more
+/// than to the farthest corner of the largest cell.
+const REACH: f64 = 20.0;
 
 /// What is near enough to enter any cell of the grid, whichever way it lies, seen from the centre
 /// of the parked body, +x along its heading.
 fn around_goal(scene: &Scene, precision: Precision) -> Surroundings {
-    /// Metres from the parked centre: more than to the farthest corner of the largest cell.
-    const REACH: f64 = 20.0;
     let far = REACH * scene.vehicle.scale();
     let center = scene.vehicle.body_center(scene.goal);
     let view = Frame { origin_in_world: center, mirrored: false }.view();
@@ -162,11 +287,12 @@ fn seen(
     scene: &Scene,
     frame: Frame,
     kind: Option<ParkingType>,
+    mouth: f64,
     precision: Precision,
 ) -> Result<SpotGuess, ObstacleError> {
     let view = frame.view();
     let obstacles = scene.geometry_by(|p| precision.point(view(p)))?;
-    Ok(SpotGuess { frame, kind, obstacles })
+    Ok(SpotGuess { frame, kind, obstacles, mouth })
 }
 
 /// The largest free lane beside the spot, if there is one.

@@ -277,7 +277,7 @@ fn mean_time(rows: &[&Row]) -> f64 {
     mean(rows.iter().map(|r| r.plan_time_s)).unwrap_or(f64::INFINITY)
 }
 
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+pub(super) fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (n, sum) = values.fold((0usize, 0.0), |(n, sum), v| (n + 1, sum + v));
     (n > 0).then(|| sum / n as f64)
 }
@@ -315,6 +315,7 @@ pub(super) mod tests {
             route: String::new(),
             cost_over_best: None,
             changes_over_fewest: None,
+            way_clearance_m: ok.then_some(0.2),
         }
     }
 

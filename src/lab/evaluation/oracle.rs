@@ -19,7 +19,7 @@ use parry2d_f64::utils::point_in_poly2d;
 
 use self::body::{Body, Extent, Solid, State};
 use self::contact::Contacts;
-use crate::episode::Judge;
+use crate::episode::{Clearance, Judge, WAY_ENDS};
 use crate::geometry::Pose;
 use crate::output::PathFile;
 use crate::vehicle::Vehicle;
@@ -28,8 +28,13 @@ use crate::world::{GoalTolerance, Scene};
 /// The independent check of every row.
 pub const JUDGE: Judge = Judge { verdict: "ok", check: judge };
 
-fn judge(scene: &Scene, path: &PathFile, share: Option<f64>, contact: f64) -> Result<f64, String> {
-    check_allowing(scene, path, share, contact).map_err(|violation| violation.to_string())
+fn judge(
+    scene: &Scene,
+    path: &PathFile,
+    share: Option<f64>,
+    contact: f64,
+) -> Result<Clearance, String> {
+    measure(scene, path, share, contact).map_err(|violation| violation.to_string())
 }
 
 /// Footprints are tested at most this far apart along the path, metres; no corner moves more
@@ -155,25 +160,31 @@ pub enum Violation {
 /// Checks a path file against its scene. Returns the smallest distance between footprint
 /// and obstacles, metres (infinite without obstacles, 0 on contact).
 pub fn check(scene: &Scene, path: &PathFile) -> Result<f64, Violation> {
-    check_allowing(scene, path, None, 0.0)
+    measure(scene, path, None, 0.0).map(|c| c.least)
 }
 
 /// [`check`] for a path that need not end at the goal, but where at least `share` of the parked
 /// footprint is covered.
 pub fn check_cover(scene: &Scene, path: &PathFile, share: f64) -> Result<f64, Violation> {
-    check_allowing(scene, path, Some(share), 0.0)
+    measure(scene, path, Some(share), 0.0).map(|c| c.least)
 }
 
 /// [`check`], or [`check_cover`] with a `share`, of a path that may begin and end up to
-/// `contact_m` metres deep in obstacles: each is only left from the start on, and only entered
-/// towards the end.
-pub fn check_allowing(
+/// `contact_m` metres deep in obstacles, with all that it measures: each is only left from the start
+/// on, and only entered towards the end.
+pub fn measure(
     scene: &Scene,
     path: &PathFile,
     share: Option<f64>,
     contact_m: f64,
-) -> Result<f64, Violation> {
+) -> Result<Clearance, Violation> {
     Oracle::new(scene).check(path, share, contact_m)
+}
+
+/// The arc over a chord: c = 2/κ · sin(κ s / 2).
+fn arc(curvature: f64, chord: f64) -> f64 {
+    let half = curvature.abs() * chord / 2.0;
+    if half < 1e-8 { chord } else { 2.0 / curvature.abs() * half.min(1.0).asin() }
 }
 
 /// A scene made ready, in coordinates relative to its start: scenes may lie anywhere.
@@ -214,7 +225,12 @@ impl Oracle {
         }
     }
 
-    fn check(&self, path: &PathFile, share: Option<f64>, contact_m: f64) -> Result<f64, Violation> {
+    fn check(
+        &self,
+        path: &PathFile,
+        share: Option<f64>,
+        contact_m: f64,
+    ) -> Result<Clearance, Violation> {
         let n = path.poses.len();
         if n == 0 || path.gears.len() != n || path.steer.len() != n {
             return Err(Violation::Shape {
@@ -239,20 +255,29 @@ impl Oracle {
         }
         self.end(state(n - 1), share)?;
         let step = CHECK_STEP * (self.vehicle.length / CHECK_LENGTH).min(1.0);
-        let mut clearance = f64::INFINITY;
         let mut contacts = Contacts::new(contact_m);
+        let curvature = |i: usize| path.steer[i].tan() / self.vehicle.wheelbase;
+        let chord = |i: usize| (state(i + 1).position - state(i).position).length();
+        let length: f64 = (0..n - 1).map(|i| arc(curvature(i), chord(i))).sum();
+        let ends = WAY_ENDS * self.vehicle.scale();
+        let way = ends..=length - ends;
+        let (mut driven, mut at_ends, mut on_the_way) = (0.0, f64::INFINITY, f64::INFINITY);
         for i in 0..n - 1 {
             let (curvature, s) =
                 self.motion(i, state(i), state(i + 1), path.gears[i], path.steer[i])?;
             let steps = (self.corner_motion(curvature, s) / step).ceil().max(1.0) as usize;
             for k in 0..steps {
-                let at = state(i).driven(curvature, s * k as f64 / steps as f64);
-                self.footprint(i, at, &mut clearance, &mut contacts)?;
+                let part = s * k as f64 / steps as f64;
+                let is_way = way.contains(&(driven + part.abs()));
+                let clearance = if is_way { &mut on_the_way } else { &mut at_ends };
+                self.footprint(i, state(i).driven(curvature, part), clearance, &mut contacts)?;
             }
+            driven += s.abs();
         }
-        self.footprint(n - 1, state(n - 1), &mut clearance, &mut contacts)?;
+        self.footprint(n - 1, state(n - 1), &mut at_ends, &mut contacts)?;
         contacts.check()?;
-        Ok(clearance)
+        let least = at_ends.min(on_the_way);
+        Ok(Clearance { least, on_the_way: (!way.is_empty()).then_some(on_the_way) })
     }
 
     /// How far the rear axle drives, or half of how far any corner may move, whichever is more.
@@ -310,10 +335,7 @@ impl Oracle {
         if along * f64::from(gear) < -(MOTION_TOL + self.rounding) {
             return Err(Violation::Gear { pose, gear });
         }
-        // The arc over a chord: c = 2/κ · sin(κ s / 2).
-        let half = curvature.abs() * chord / 2.0;
-        let arc = if half < 1e-8 { chord } else { 2.0 / curvature.abs() * half.min(1.0).asin() };
-        let s = arc * f64::from(gear);
+        let s = arc(curvature, chord) * f64::from(gear);
         let (metres, rad) = from.driven(curvature, s).apart(to);
         // A chord that is a little too long turns a little too far.
         let turn = self.rounding * curvature.abs();

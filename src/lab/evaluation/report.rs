@@ -5,6 +5,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::Serialize;
 
+use super::clearance;
 use super::learning_curve::{self, CurvePoint};
 use super::metrics;
 use super::quality;
@@ -89,6 +90,10 @@ pub fn text(rows: &[Row], seed: u64) -> String {
     }
     let _ = writeln!(out, "{}", table::speed_ups(&groups).text());
     let _ = writeln!(out, "{}", quality::table(&quality::summarise(rows)).text());
+    let clearance = clearance::table(rows);
+    if !clearance.rows.is_empty() {
+        let _ = writeln!(out, "{}", clearance.text());
+    }
     let failures = table::failures(rows);
     if failures.rows.is_empty() {
         let applicable = rows.iter().filter(|r| r.applies()).count();
@@ -124,6 +129,10 @@ pub fn markdown(
     let _ = write!(out, "\n{NOTES}");
     let quality = quality::table(&quality::summarise(rows));
     let _ = write!(out, "\n{}\n{}\n", quality.markdown(), quality::NOTE);
+    let clearance = clearance::table(rows);
+    if !clearance.rows.is_empty() {
+        let _ = write!(out, "\n{}\n{}\n", clearance.markdown(), clearance::NOTE);
+    }
     let failures = table::failures(rows);
     if failures.rows.is_empty() {
         out += "\n## Failures\n\nNone.\n";

@@ -91,8 +91,12 @@ pub fn read_csv(path: &Path) -> Result<Vec<Row>, RowsError> {
         if i == 0 {
             let is_header =
                 |less: &usize| line == Row::COLUMNS[..Row::COLUMNS.len() - less].join(",");
-            missing = [0, Row::COMPARING]
-                .into_iter()
+            let last = [0].into_iter().chain(Row::ADDED.into_iter().rev());
+            missing = last
+                .scan(0, |less, added| {
+                    *less += added;
+                    Some(*less)
+                })
                 .find(is_header)
                 .ok_or_else(|| format("expected the header of a rows.csv".to_owned()))?;
             continue;
@@ -138,6 +142,7 @@ pub fn write_parquet(path: &Path, rows: &[Row]) -> Result<(), RowsError> {
         text(|r| Some(r.route.clone())),
         number(|r| r.cost_over_best),
         count(|r| r.changes_over_fewest),
+        number(|r| r.way_clearance_m),
     ];
     let named = Row::COLUMNS.into_iter().zip(columns).map(|(name, column)| (name, column, true));
     let batch = RecordBatch::try_from_iter_with_nullable(named)
@@ -179,6 +184,7 @@ fn from_fields(f: &[String]) -> Result<Row, String> {
         route: f[15].clone(),
         cost_over_best: maybe(f, 16)?,
         changes_over_fewest: maybe(f, 17)?,
+        way_clearance_m: maybe(f, 18)?,
     })
 }
 
@@ -227,6 +233,7 @@ mod tests {
             route: "fallback".into(),
             cost_over_best: Some(1.0 + 1.0 / 3.0),
             changes_over_fewest: Some(1),
+            way_clearance_m: Some(0.1 + 0.2),
         }
     }
 
@@ -237,10 +244,17 @@ mod tests {
         write_csv(&path, &[row(), row()]).unwrap();
         assert_eq!(read_csv(&path).unwrap(), [row(), row()]);
         let text = std::fs::read_to_string(&path).unwrap();
-        let kept = |line: &str| line.rsplitn(3, ',').nth(2).unwrap().to_owned() + "\n";
-        std::fs::write(&path, text.lines().map(kept).collect::<String>()).unwrap();
-        let before = Row { cost_over_best: None, changes_over_fewest: None, ..row() };
-        assert_eq!(read_csv(&path).unwrap(), [before.clone(), before]);
+        let without = |last: usize| {
+            let kept =
+                |line: &str| line.rsplitn(last + 1, ',').nth(last).unwrap().to_owned() + "\n";
+            std::fs::write(&path, text.lines().map(kept).collect::<String>()).unwrap();
+            read_csv(&path)
+        };
+        let before = Row { way_clearance_m: None, ..row() };
+        assert_eq!(without(1).unwrap(), [before.clone(), before.clone()]);
+        let before = Row { cost_over_best: None, changes_over_fewest: None, ..before };
+        assert_eq!(without(3).unwrap(), [before.clone(), before]);
+        assert!(without(2).unwrap_err().to_string().contains("header"));
         std::fs::write(&path, text.replace(",changes_over_fewest", "")).unwrap();
         assert!(read_csv(&path).unwrap_err().to_string().contains("header"));
     }

@@ -191,12 +191,11 @@ pub fn run(
     runner.evaluate(runner.ready()?, &trained, &curve)
 }
 
-/// The differences between the rows of two runs, times aside; one line each. Columns that compare
-/// rows are not held against rows on record without them.
+/// The differences between the rows of two runs, times aside; one line each. Columns that the format
+/// got later are not held against rows on record without them.
 pub fn differences(expected: &[Row], found: &[Row]) -> Vec<String> {
     let mut lines = Vec::new();
     let name = |row: &Row| format!("{} by {}", row.scene, row.method);
-    let (_, comparing) = Row::COLUMNS.split_at(Row::COLUMNS.len() - Row::COMPARING);
     for row in expected {
         let Some(other) = found.iter().find(|r| r.key() == row.key()) else {
             lines.push(format!("{}: missing in the new run", name(row)));
@@ -204,7 +203,7 @@ pub fn differences(expected: &[Row], found: &[Row]) -> Vec<String> {
         };
         let columns = Row::COLUMNS.iter().zip(row.untimed().fields());
         for ((column, old), new) in columns.zip(other.untimed().fields()) {
-            let unrecorded = old.is_empty() && comparing.contains(column);
+            let unrecorded = old.is_empty() && Row::added().contains(column);
             if old != new && !unrecorded {
                 lines.push(format!("{}: {column} was {old}, is {new}", name(row)));
             }
