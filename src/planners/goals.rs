@@ -300,8 +300,10 @@ fn ended_early(problem: &Problem, result: PlanResult) -> PlanResult {
     };
     // Half of what the certificate forgives: headings that are to be equal differ by roundings.
     let arrived = |pose| tolerance.holds(goal, pose, Problem::ROUNDING / 2.0);
-    let Some(path) = up_to(path, arrived) else { return result };
-    let early = PlanResult::certified(problem, path, result.expansions);
+    // Who arrives only at the end keeps the path as it is, to its last digit.
+    let is_shorter = |early: &Path| early.length() < path.length() - Problem::ROUNDING;
+    let Some(early) = up_to(path, arrived).filter(is_shorter) else { return result };
+    let early = PlanResult::certified(problem, early, result.expansions);
     match early.outcome {
         Ok(_) => PlanResult { guidance: result.guidance, ..early },
         Err(_) => result,
