@@ -7,6 +7,8 @@ use crate::planners::hybrid_astar::{GoalSet, Leg};
 use crate::planners::library::{Library, LibraryPlan};
 use crate::planners::{Guidance, Problem, Route};
 use crate::world::ParkingType;
+use crate::world::abstraction::abstractions;
+use crate::world::cell::Grid;
 
 /// Libraries kept prepared: those of the parking types of two vehicles, or of one with two margins.
 const LIBRARIES: usize = 6;
@@ -174,10 +176,15 @@ impl GuidedPlanner {
             && self.is_unusual(problem)
     }
 
-    /// Whether no cell of the model stands for the spot as it is.
+    /// Whether no usual cell stands for the spot as it is. Of the vehicle's size: one model may serve
+    /// vehicles of any.
     pub(super) fn is_unusual(&self, problem: &Problem) -> bool {
-        problem.kind.is_some()
-            && (problem.mouth > DEEPER * problem.vehicle.scale() || self.cells(problem).is_empty())
+        let scale = problem.vehicle.scale();
+        problem.kind.is_some_and(|kind| {
+            let grid = || Grid::default().scaled(scale);
+            problem.mouth > DEEPER * scale
+                || abstractions(&problem.obstacles, kind, &grid()).is_empty()
+        })
     }
 
     /// What is known, or the rest of the manoeuvre that the car stands in where that costs less: who
