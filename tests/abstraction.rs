@@ -1,5 +1,7 @@
 //! The abstraction is an inner approximation: no obstacle reaches into it, ever.
 
+#![cfg(feature = "lab")]
+
 use n3p::geometry::{Aabb, Polygon, Pose, Vec2};
 use n3p::planners::{Budget, HybridAStar, HybridAStarConfig, Planner, Problem};
 use n3p::rng::{Stream, rng};

@@ -1,5 +1,7 @@
 //! A scene may lie anywhere: shifted, turned or mirrored it is planned the same way.
 
+#![cfg(feature = "lab")]
+
 #[path = "fixtures/lots.rs"]
 mod lots;
 

@@ -1,6 +1,8 @@
 //! The graph-search baselines on generated scenes: their paths hold, and each is what its
 //! description says.
 
+#![cfg(feature = "lab")]
+
 use n3p::lab::evaluation::oracle;
 use n3p::n3p::{Method, MethodSettings, Models};
 use n3p::output::PathFile;

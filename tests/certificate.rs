@@ -1,5 +1,7 @@
 //! The certificate at its edges: obstacles that are hardly any, whole turns, vehicles of any size.
 
+#![cfg(feature = "lab")]
+
 use std::f64::consts::{PI, TAU};
 
 use n3p::curves::{Path, Segment};

@@ -1,5 +1,7 @@
 //! The commands' contract: exit codes, and errors that say file, field and remedy.
 
+#![cfg(feature = "lab")]
+
 use std::path::Path;
 
 use assert_cmd::Command;

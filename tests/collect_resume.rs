@@ -1,5 +1,7 @@
 //! A collection that is killed at any moment and resumed ends with the same bytes.
 
+#![cfg(feature = "lab")]
+
 mod fixtures;
 
 use std::fs;

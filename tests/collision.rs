@@ -1,6 +1,8 @@
 //! The exact swept check against parry2d: distances along the motion, stepped so that no
 //! contact can hide between two steps.
 
+#![cfg(feature = "lab")]
+
 use n3p::curves::Segment;
 use n3p::geometry::{Polygon, Pose, Vec2};
 use n3p::rng::{Stream, rng};

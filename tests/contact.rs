@@ -1,5 +1,7 @@
 //! `--allow-contact`: a contact is left and never deepened, whoever plans.
 
+#![cfg(feature = "lab")]
+
 use assert_cmd::Command;
 use n3p::curves::{Path, Segment};
 use n3p::geometry::{Frame, Pose};

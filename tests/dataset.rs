@@ -1,5 +1,7 @@
 //! Writing a data set and reading it back; what a damaged or foreign one is answered with.
 
+#![cfg(feature = "lab")]
+
 mod fixtures;
 
 use std::fs;

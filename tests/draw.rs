@@ -2,6 +2,8 @@
 //!
 //! `N3P_PICTURES=DIR cargo test --release --test draw` keeps the example pictures in DIR.
 
+#![cfg(feature = "lab")]
+
 #[path = "fixtures/lots.rs"]
 mod lots;
 

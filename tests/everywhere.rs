@@ -1,5 +1,7 @@
 //! Right everywhere: what holds of plans whatever the scene, its size, and where the car stands.
 
+#![cfg(feature = "lab")]
+
 use n3p::curves::Path;
 use n3p::geometry::Pose;
 use n3p::lab::evaluation::oracle;

@@ -1,5 +1,7 @@
 //! A tiny experiment from start to end: run, go on after an interruption, reproduce.
 
+#![cfg(feature = "lab")]
+
 use std::path::Path;
 
 use assert_cmd::Command;

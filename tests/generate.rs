@@ -1,5 +1,7 @@
 //! The laws of generated scenes, judged by parry2d instead of our own geometry.
 
+#![cfg(feature = "lab")]
+
 use std::path::Path;
 
 use n3p::geometry::{Aabb, Pose, Vec2, signed_angle};

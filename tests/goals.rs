@@ -1,5 +1,7 @@
 //! Several goals and goal tolerances: the cheapest is taken, whatever the order, and none is dearer.
 
+#![cfg(feature = "lab")]
+
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path as FilePath;
 

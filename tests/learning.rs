@@ -1,5 +1,7 @@
 //! Samples → artefacts → selectors, on synthetic samples.
 
+#![cfg(feature = "lab")]
+
 use std::path::{Path, PathBuf};
 
 use n3p::curves::Segment;

@@ -1,5 +1,7 @@
 //! `--margin`: plans keep it, say when they cannot, and refuse what is none.
 
+#![cfg(feature = "lab")]
+
 use std::path::Path;
 
 use assert_cmd::Command;

@@ -1,5 +1,7 @@
 //! N3P with the models in the repository.
 
+#![cfg(feature = "lab")]
+
 use n3p::curves::Segment;
 use n3p::curves::reeds_shepp::{Word, words};
 use n3p::geometry::Pose;

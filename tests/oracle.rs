@@ -1,6 +1,8 @@
 //! The independent check refuses hand-made bad paths, each for its own reason, and
 //! accepts good ones wherever the scene lies.
 
+#![cfg(feature = "lab")]
+
 use n3p::curves::{Path, Segment};
 use n3p::geometry::{Frame, Pose};
 use n3p::lab::evaluation::oracle::{self, Violation};

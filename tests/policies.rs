@@ -1,5 +1,7 @@
 //! Policies from outside: the two examples, and everything that files and programs can do wrong.
 
+#![cfg(feature = "lab")]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -3,6 +3,8 @@
 //! The second test needs Chromium on the PATH, so it runs only where it is asked for:
 //! `cargo test --release --test report -- --ignored`.
 
+#![cfg(feature = "lab")]
+
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;

@@ -1,5 +1,7 @@
 //! Laws of what policies see and do, held against the exact swept check and parry2d.
 
+#![cfg(feature = "lab")]
+
 use n3p::geometry::{Pose, Vec2};
 use n3p::lab::rl::courses::{Course, Stratum};
 use n3p::lab::rl::motion::{self, ActionMask, PARTS, admitted, drive};

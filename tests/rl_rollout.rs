@@ -1,5 +1,7 @@
 //! Policies as planners: rows like any other, failures with a reason.
 
+#![cfg(feature = "lab")]
+
 use n3p::episode;
 use n3p::episode::{Case, EpisodeConfig};
 use n3p::lab::evaluation::oracle;

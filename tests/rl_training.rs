@@ -1,5 +1,7 @@
 //! A training that is killed and resumed ends with the same curve and the same policy.
 
+#![cfg(feature = "lab")]
+
 use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};

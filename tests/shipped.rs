@@ -1,5 +1,7 @@
 //! What the repository holds fits together: settings, data sets, models, experiments.
 
+#![cfg(feature = "lab")]
+
 use std::path::Path;
 
 use n3p::lab::dataset::{CollectConfig, Dataset};

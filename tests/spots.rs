@@ -1,6 +1,8 @@
 //! Laws of recognising spots: an unusual bay is what it is, whichever way the car comes from and
 //! wherever it lies; oblique ones have no type.
 
+#![cfg(feature = "lab")]
+
 use n3p::geometry::{Frame, Pose, Vec2};
 use n3p::vehicle::Vehicle;
 use n3p::world::bays::{Unusual, bay};

@@ -1,5 +1,7 @@
 //! Trajectories: the laws they keep, and the files that `n3p-plan` writes.
 
+#![cfg(feature = "lab")]
+
 use std::path::Path as FilePath;
 
 use assert_cmd::Command;

@@ -1,5 +1,7 @@
 //! Other vehicles: what a model serves, what it refuses, and one model for all.
 
+#![cfg(feature = "lab")]
+
 use std::path::Path;
 use std::process::Command;
 
