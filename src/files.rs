@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use hmac_sha256::Hash;
+use sha2::{Digest, Sha256};
 
 /// Ends the names of unfinished files; a killed run may leave some.
 pub const TEMPORARY: &str = ".tmp";
@@ -119,11 +119,11 @@ pub fn reason(error: &io::Error) -> String {
 
 /// SHA-256 over the concatenation of `parts`.
 pub fn sha256(parts: &[&[u8]]) -> [u8; 32] {
-    let mut hasher = Hash::new();
+    let mut hasher = Sha256::new();
     for part in parts {
         hasher.update(part);
     }
-    hasher.finalize()
+    hasher.finalize().into()
 }
 
 /// SHA-256 in lower-case hexadecimal.

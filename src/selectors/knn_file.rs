@@ -228,7 +228,10 @@ fn f32_at(bytes: &[u8], at: usize) -> f64 {
     f64::from(f32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes")))
 }
 
-fn check(bytes: &[u8]) -> Result<(KnnHeader, Vec<Section>), Fault> {
+fn check(bytes: &Cow<'static, [u8]>) -> Result<(KnnHeader, Vec<Section>), Fault> {
+    // What is compiled in is as whole as the program, and a test has checked it.
+    let is_compiled_in = matches!(bytes, Cow::Borrowed(_));
+    let bytes: &[u8] = bytes;
     if bytes.is_empty() {
         return Err(Fault::Empty);
     }
@@ -250,7 +253,8 @@ fn check(bytes: &[u8]) -> Result<(KnnHeader, Vec<Section>), Fault> {
     if got != expected {
         return Err(Fault::Length { expected, got });
     }
-    if sha256(&[&bytes[..CHECKSUM.start], &bytes[PREAMBLE..]]) != bytes[CHECKSUM] {
+    if !is_compiled_in && sha256(&[&bytes[..CHECKSUM.start], &bytes[PREAMBLE..]]) != bytes[CHECKSUM]
+    {
         return Err(Fault::Checksum);
     }
     let payload = PREAMBLE + header_len;

@@ -12,10 +12,6 @@ pub static FILES: &[(&str, &[u8])] = &[
     ("mlp-parallel.safetensors", include_bytes!("../../models/mlp-parallel.safetensors")),
     ("mlp-reverse.safetensors", include_bytes!("../../models/mlp-reverse.safetensors")),
     ("fleet.safetensors", include_bytes!("../../models/fleet.safetensors")),
-    #[cfg(feature = "lab")]
-    ("rl-eval.safetensors", include_bytes!("../../models/rl-eval.safetensors")),
-    #[cfg(feature = "lab")]
-    ("rl-simple.safetensors", include_bytes!("../../models/rl-simple.safetensors")),
 ];
 
 /// Nothing is compiled in.
@@ -25,4 +21,23 @@ pub static FILES: &[(&str, &[u8])] = &[];
 /// The model of a bare name.
 pub fn find(name: &Path) -> Option<&'static [u8]> {
     FILES.iter().find(|(known, _)| name.as_os_str() == *known).map(|(_, bytes)| *bytes)
+}
+
+#[cfg(all(test, feature = "models"))]
+mod tests {
+    use std::borrow::Cow;
+
+    use super::*;
+    use crate::selectors::model::Model;
+
+    /// As files they pass every check, the checksum too.
+    #[test]
+    fn what_is_compiled_in_is_whole() {
+        for (name, bytes) in FILES {
+            let model = Model::from_bytes(Path::new(name), Cow::Owned(bytes.to_vec())).unwrap();
+            assert!(!model.kinds().is_empty(), "{name}");
+            assert_eq!(find(Path::new(name)), Some(*bytes));
+        }
+        assert_eq!(find(Path::new("./knn.bin")), None, "a path is that of a file");
+    }
 }

@@ -1,6 +1,6 @@
 //! What a data set is called: a checksum over its settings and rows.
 
-use hmac_sha256::Hash;
+use sha2::{Digest, Sha256};
 
 use super::schema::{Metadata, Sample, manoeuvre_text};
 
@@ -11,7 +11,7 @@ pub fn content_sha256<'a>(
     metadata: &Metadata,
     samples: impl IntoIterator<Item = &'a Sample>,
 ) -> String {
-    let mut hash = Hash::new();
+    let mut hash = Sha256::new();
     hash.update(metadata.settings().to_string());
     let mut samples: Vec<&Sample> = samples.into_iter().collect();
     samples.sort_by_key(|s| (s.cell.kind, s.cell_index, s.sample_index));
