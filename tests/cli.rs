@@ -82,10 +82,10 @@ fn a_missing_scene_and_a_wrong_method_are_refused() {
         .code(2)
         .stderr(contains("rl-simple.safetensors").and(contains("n3p-train rl --env simple")));
     command("n3p-plan", dir.path())
-        .args(["--scene", "s.json", "--method", "n3p"])
+        .args(["--scene", "s.json", "--method", "n3p", "--model", "mine.bin"])
         .assert()
         .code(2)
-        .stderr(contains("--model").and(contains("n3p-train knn")));
+        .stderr(contains("mine.bin").and(contains("n3p-train")));
 }
 
 #[test]
@@ -96,12 +96,32 @@ fn a_plan_is_printed_written_and_drawn() {
         .args(["--scene", "s.json", "--out", "path.json", "--svg", "picture.svg"])
         .assert()
         .success()
-        .stdout(contains("path by ha-rs").and(contains("direction changes")));
+        .stdout(contains("path by n3p").and(contains("direction changes")));
     let scene = Scene::read(&dir.path().join("s.json")).unwrap();
     let path = PathFile::read(&dir.path().join("path.json")).unwrap();
     assert!(oracle::check(&scene, &path).unwrap() > 0.0);
     let picture = std::fs::read_to_string(dir.path().join("picture.svg")).unwrap();
-    assert!(picture.contains("<svg") && picture.contains("ha-rs"));
+    assert!(picture.contains("<svg") && picture.contains("n3p"));
+}
+
+/// A program that is copied anywhere plans with what is compiled in; files of the same names come
+/// first, and one that cannot be used is told.
+#[test]
+fn models_are_listed_with_where_they_come_from() {
+    let dir = tempfile::tempdir().unwrap();
+    let list = || command("n3p-plan", dir.path()).arg("--models").assert();
+    list()
+        .success()
+        .stdout(contains("knn.bin").and(contains("compiled in")).and(contains("4.97 x 1.86 m")));
+    std::fs::create_dir(dir.path().join("models")).unwrap();
+    let own = dir.path().join("models/knn.bin");
+    std::fs::copy("models/knn-tpcap.bin", &own).unwrap();
+    let listed = list().success();
+    let text = String::from_utf8_lossy(&listed.get_output().stdout).into_owned();
+    let line = text.lines().find(|l| l.starts_with("models/knn.bin")).unwrap();
+    assert!(line.contains("file") && line.contains("4.69 x 1.942 m"), "{text}");
+    std::fs::write(&own, "no model").unwrap();
+    list().code(2).stderr(contains("models/knn.bin: not a model")).stdout(contains("fleet"));
 }
 
 #[test]
@@ -171,7 +191,7 @@ fn eval_refuses_bad_arguments() {
         (&["--type", "sideways"][..], &["sideways", "parallel"][..]),
         (&["--level", "hard"], &["hard", "extreme"]),
         (&["--methods", "ha-rs,nope"], &["nope", "n3p"]),
-        (&["--methods", "knn-n3p"], &["--model", "n3p-train knn"]),
+        (&["--methods", "knn-n3p", "--model", "none.bin"], &["none.bin", "n3p-train"]),
         (&["--methods", "rl-eval"], &["rl-eval.safetensors", "n3p-train rl --env eval"]),
         (&["--methods", "policy"], &["--policy FILE.onnx", "docs/policies.md"]),
         (&["--policy", "none.onnx"], &["none.onnx", "no such file"]),
