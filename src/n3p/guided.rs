@@ -195,7 +195,7 @@ impl GuidedPlanner {
         effort: Effort,
         left: &mut usize,
     ) -> Result<(Path, Guidance), NoPath> {
-        let mut goal = self.hars.goal_set_of_cell(problem, problem.mouth);
+        let mut goal = self.hars.goal_set(problem);
         let has_library = config.library && self.prepare_library(problem);
         if has_library && let Some(known) = self.look_up(problem, &goal) {
             return Ok(self.settle(problem, &goal, known, effort, left));

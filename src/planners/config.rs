@@ -177,10 +177,14 @@ impl HybridAStarConfig {
         }
     }
 
-    /// The goal of `problem` with the entry straights that are free.
+    /// The goal of `problem` with the entry straights that are free; where the lane begins farther
+    /// out than beside a usual spot also those that begin as much farther out.
     pub(super) fn goal_set(&self, problem: &Problem) -> GoalSet {
         let mut goal = GoalSet::single(problem.goal);
         self.add_straights(problem, 0.0, &mut goal);
+        if problem.mouth > 0.0 {
+            self.add_straights(problem, problem.mouth, &mut goal);
+        }
         goal
     }
 
