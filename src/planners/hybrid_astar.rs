@@ -323,7 +323,11 @@ impl HybridAStar {
             return path;
         }
         let Ok(config) = self.config.for_search(&problem.vehicle) else { return path };
-        let domain = config.domains(problem, problem.start, goal.pose)[0];
+        let mut domain = config.domains(problem, problem.start, goal.pose)[0];
+        if spent > 0 {
+            // Half a cell aside of the lattice that the path comes from: what that one misses is found.
+            domain = domain.inflated(config.resolutions[0].cell / 2.0);
+        }
         let resolution = &config.resolutions[0];
         let attempt = Attempt { config: &config, resolution, domain, careful: false };
         let share = effort.patience(spent, *left);
