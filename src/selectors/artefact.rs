@@ -207,20 +207,22 @@ pub fn exists(path: &Path) -> bool {
     path.exists() || shipped::find(path).is_some()
 }
 
-/// The bytes of a model.
+/// The bytes of a model, from its file or as it is compiled in.
 pub(crate) fn read(path: &Path) -> Result<Cow<'static, [u8]>, ArtefactError> {
-    let mut file = match open(path) {
-        Ok(file) => file,
-        Err(error) => match (&error.fault, shipped::find(path)) {
-            (Fault::Missing, Some(bytes)) => return Ok(Cow::Borrowed(bytes)),
-            _ => return Err(error),
-        },
-    };
+    match (read_file(path), shipped::find(path)) {
+        (Err(ArtefactError { fault: Fault::Missing, .. }), Some(bytes)) => Ok(Cow::Borrowed(bytes)),
+        (bytes, _) => bytes.map(Cow::Owned),
+    }
+}
+
+/// The bytes of a file of weights.
+pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>, ArtefactError> {
+    let mut file = open(path)?;
     // Of the right size at once, where it is known.
     let size = file.metadata().map_or(0, |m| m.len());
     let mut bytes = Vec::with_capacity(usize::try_from(size).unwrap_or(0));
     file.read_to_end(&mut bytes).map_err(|e| Fault::Unreadable(e).of(path))?;
-    Ok(Cow::Owned(bytes))
+    Ok(bytes)
 }
 
 /// Opens a model file, refusing missing ones.

@@ -60,7 +60,7 @@ pub fn encode(header: &PolicyHeader, actor: &BTreeMap<String, Vec<f32>>) -> Vec<
 
 /// Reads and checks a policy.
 pub fn load(path: &Path) -> Result<(PolicyHeader, Actor), ArtefactError> {
-    let bytes = artefact::read(path)?;
+    let bytes = artefact::read_file(path)?;
     decode(&bytes).map_err(|fault| fault.of(path))
 }
 

@@ -143,7 +143,7 @@ pub fn write(
 
 /// Reads a checkpoint: the state, the agent and its memory.
 pub fn read(path: &Path, device: &Device) -> Result<(State, Sac, Replay), ArtefactError> {
-    let bytes = artefact::read(path)?;
+    let bytes = artefact::read_file(path)?;
     decode(&bytes, device).map_err(|fault| fault.of(path))
 }
 
