@@ -153,6 +153,14 @@ impl Scene {
         Ok(scene)
     }
 
+    /// The scene of a text in the scene format, validated. `origin` is where the text comes from,
+    /// for messages.
+    pub fn from_json(text: &str, origin: &Path) -> Result<Scene, SceneError> {
+        let scene = parse_json(text, origin)?;
+        scene.validate(origin)?;
+        Ok(scene)
+    }
+
     /// Reads every `.json` and `.csv` file of a folder, in the order of their names.
     /// A scene whose name another one has already is called after its file instead, so
     /// that names are unique. Fails with the first file that is no scene.
