@@ -9,7 +9,7 @@ use n3p::{Method, Models, Parker, Plan, PlanError, Request};
 
 use super::handles::Table;
 use super::lot::{held, n3p_lot};
-use super::memory::{Place, read, read_all, read_or, read_text};
+use super::memory::{N3P_MAX_COUNT, Place, read, read_all, read_or, read_text};
 use super::plan::{Kept, PLANS, n3p_plan};
 use super::scene::{SCENES, n3p_scene};
 use super::status::{Failure, Result, guarded, n3p_status};
@@ -185,6 +185,8 @@ pub unsafe extern "C" fn n3p_parker_plan_batch(
     })
 }
 
+type Places<T> = Vec<Place<T>>;
+
 /// Where the results of a batch go; no statuses where nobody asks for them.
 ///
 /// # Safety
@@ -194,9 +196,9 @@ unsafe fn places(
     plans: *mut *mut n3p_plan,
     statuses: *mut n3p_status,
     count: usize,
-) -> Result<(Vec<Place<*mut n3p_plan>>, Vec<Place<n3p_status>>)> {
-    if count > super::memory::N3P_MAX_COUNT {
-        let text = format!("count is {count}; expected at most {}", super::memory::N3P_MAX_COUNT);
+) -> Result<(Places<*mut n3p_plan>, Places<n3p_status>)> {
+    if count > N3P_MAX_COUNT {
+        let text = format!("count is {count}; expected at most {N3P_MAX_COUNT}");
         return Err(Failure::bad_input(text));
     }
     let asked = if statuses.is_null() { 0 } else { count };
