@@ -157,6 +157,8 @@ pub unsafe extern "C" fn n3p_parker_plan_batch(
             place.put(status);
         }
     };
+    // So that nothing is left undefined, whatever happens.
+    (0..count).for_each(|i| put(i, ptr::null_mut(), n3p_status::N3P_INTERNAL));
     let mut results = Vec::new();
     let status = guarded(|| {
         let parker = PARKERS.get(parker, "parker")?;

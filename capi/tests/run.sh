@@ -30,6 +30,10 @@ echo "-- C"
 gcc -std=c11 "${warnings[@]}" capi/tests/misuse.c "${library[@]}" -pthread -lm -o "$work/misuse"
 gcc -std=c11 "${warnings[@]}" capi/tests/misuse.c "${static[@]}" -pthread -o "$work/misuse-static"
 gcc -std=c11 "${warnings[@]}" examples/c/smallest.c "${library[@]}" -o "$work/smallest"
+# The program in the guide.
+awk '/^```$/ { inside = 0 } inside; /^```c$/ { inside = 1 }' docs/c.md >"$work/guide.c"
+gcc -std=c11 "${warnings[@]}" "$work/guide.c" "${library[@]}" -o "$work/guide"
+"$work/guide"
 "$work/misuse"
 "$work/misuse-static"
 "$work/smallest" >/dev/null
