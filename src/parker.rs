@@ -409,6 +409,11 @@ impl Plan {
         self.kind
     }
 
+    /// The method that planned it.
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
     /// Node expansions that it took.
     pub fn expansions(&self) -> usize {
         self.expansions

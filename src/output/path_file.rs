@@ -108,10 +108,16 @@ impl PathFile {
         Ok(path)
     }
 
+    /// The text of the file, every number exactly as it is.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string(self).expect("plain numbers and strings")
+    }
+
     /// Writes the file (to a temporary name, then renamed).
     pub fn write(&self, file: &FilePath) -> Result<(), PathFileError> {
-        let json = serde_json::to_vec(self).expect("plain numbers and strings");
-        write_whole(file, &json).map_err(|error| PathFileError::Io { path: file.to_owned(), error })
+        let json = self.to_json();
+        write_whole(file, json.as_bytes())
+            .map_err(|error| PathFileError::Io { path: file.to_owned(), error })
     }
 }
 

@@ -153,6 +153,14 @@ impl Scene {
         Ok(scene)
     }
 
+    /// The scene of a text in the scene format, validated. `origin` is where the text comes from,
+    /// for messages.
+    pub fn from_json(text: &str, origin: &Path) -> Result<Scene, SceneError> {
+        let scene = parse_json(text, origin)?;
+        scene.validate(origin)?;
+        Ok(scene)
+    }
+
     /// Reads every `.json` and `.csv` file of a folder, in the order of their names.
     /// A scene whose name another one has already is called after its file instead, so
     /// that names are unique. Fails with the first file that is no scene.
@@ -264,7 +272,7 @@ impl Scene {
             let message = format!("has {given} poses; expected at most {most}");
             return invalid("goals".to_owned(), message);
         }
-        for (field, pose) in self.poses() {
+        for (which, pose) in self.poses() {
             let heading = match pose.heading.abs() {
                 h if h <= Self::MAX_HEADING => None,
                 h if h.is_finite() => Some("has too large a heading; expected at most 1e7 rad"),
@@ -273,12 +281,13 @@ impl Scene {
             // Their distance has a limit of its own, below.
             if let Some(message) = fault(&[pose.x, pose.y], f64::INFINITY).or(heading) {
                 let values = <[f64; 3]>::from(pose);
-                return invalid(field, format!("= {values:?} {message}"));
+                return invalid(self.pose_field(which), format!("= {values:?} {message}"));
             }
         }
-        for (field, goal) in self.poses().skip(1) {
+        for (which, goal) in self.poses().skip(1) {
             let distance = self.start.distance(goal);
             if distance > Self::MAX_DISTANCE {
+                let field = self.pose_field(which);
                 let what = if field == "goal" { "the goal" } else { &field };
                 let most = Self::MAX_DISTANCE;
                 let message =
@@ -324,11 +333,15 @@ impl Scene {
         Ok(())
     }
 
-    /// Start and goals, each with its field.
-    fn poses(&self) -> impl Iterator<Item = (String, Pose)> + '_ {
-        let goals = self.all_goals().iter().enumerate();
-        let goals = goals.map(|(i, &goal)| (self.goal_field(i), goal));
-        std::iter::once(("start".to_owned(), self.start)).chain(goals)
+    /// Start and goals; the start is `None`, a goal its index.
+    fn poses(&self) -> impl Iterator<Item = (Option<usize>, Pose)> + '_ {
+        let goals = self.all_goals().iter().enumerate().map(|(i, &goal)| (Some(i), goal));
+        std::iter::once((None, self.start)).chain(goals)
+    }
+
+    /// The field of one of these poses.
+    fn pose_field(&self, which: Option<usize>) -> String {
+        which.map_or_else(|| "start".to_owned(), |goal| self.goal_field(goal))
     }
 
     /// A warning where headings look like degrees: no scene needs whole turns, and no heading in
@@ -339,8 +352,9 @@ impl Scene {
             h.abs() > TAU * 1.0001 && (halves - halves.round()).abs() < 1e-6
         };
         let suspects = self.poses().filter(|(_, pose)| is_suspect(pose.heading));
-        let told: Vec<String> =
-            suspects.map(|(field, pose)| format!("{field} is {}", pose.heading)).collect();
+        let told: Vec<String> = suspects
+            .map(|(which, pose)| format!("{} is {}", self.pose_field(which), pose.heading))
+            .collect();
         let what = told.join(", that of ");
         (!told.is_empty()).then(|| {
             format!("the heading of {what}; headings are taken as radians (90° is 1.5708)")

@@ -1,0 +1,262 @@
+//! Planning.
+
+use std::iter::zip;
+use std::ptr;
+
+use n3p::geometry::Pose;
+use n3p::world::{GoalTolerance, Scene};
+use n3p::{Method, Models, Parker, Plan, PlanError, Request};
+
+use super::handles::Table;
+use super::lot::{held, n3p_lot};
+use super::memory::{N3P_MAX_COUNT, Place, read, read_all, read_or, read_text};
+use super::plan::{Kept, PLANS, n3p_plan};
+use super::scene::{SCENES, n3p_scene};
+use super::status::{Failure, Result, guarded, n3p_status};
+use super::types::{n3p_options, n3p_pose, n3p_request, n3p_vehicle, parking_type};
+
+/// Plans for one vehicle.
+pub enum n3p_parker {}
+
+static PARKERS: Table<Parker> = Table::new("n3p_parker", 3);
+
+/// Makes a parker for a vehicle, with the models that are compiled in; to be freed by
+/// n3p_parker_free. NULL options are the defaults.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn n3p_parker_new(
+    vehicle: *const n3p_vehicle,
+    options: *const n3p_options,
+    parker: *mut *mut n3p_parker,
+) -> n3p_status {
+    guarded(|| {
+        // SAFETY: the caller's word.
+        let parker = unsafe { Place::new(parker, "parker") }?;
+        parker.put(ptr::null_mut());
+        // SAFETY: the caller's word.
+        let vehicle = unsafe { read(vehicle, "vehicle") }?.into();
+        // SAFETY: the caller's word.
+        let options = unsafe { read_or(options, "options", n3p_options::DEFAULT) }?;
+        let made = if options.method.is_null() {
+            Parker::new(vehicle)?
+        } else {
+            // SAFETY: the caller's word.
+            let method: Method = unsafe { read_text(options.method, "options.method") }?
+                .parse()
+                .map_err(|e| Failure::bad_input(format!("options.method: {e}")))?;
+            vehicle.validate().map_err(n3p::ParkerError::from)?;
+            let models = Models::compiled_in(&vehicle).map_err(n3p::ParkerError::from)?;
+            Parker::by(method, vehicle, models)?
+        };
+        let made = made.margin(options.margin)?.allow_contact(options.allow_contact)?;
+        parker.put(PARKERS.open(made.budget(options.budget()?)));
+        Ok(())
+    })
+}
+
+/// Frees a parker; NULL is none. Plans of other threads that are under way end well.
+#[unsafe(no_mangle)]
+pub extern "C" fn n3p_parker_free(parker: *mut n3p_parker) -> n3p_status {
+    guarded(|| PARKERS.close(parker))
+}
+
+/// Plans from `start` to `goal` among what stands in `lot`. `plan` is to be freed by n3p_plan_free;
+/// it is NULL unless the function returns N3P_OK.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn n3p_parker_plan(
+    parker: *const n3p_parker,
+    start: n3p_pose,
+    goal: n3p_pose,
+    lot: *const n3p_lot,
+    plan: *mut *mut n3p_plan,
+) -> n3p_status {
+    let request = || Ok(Request::new(start.into(), goal.into()));
+    // SAFETY: the caller's word.
+    unsafe { plan_in(parker, request, lot, plan) }
+}
+
+/// Plans a request, which may have several goals, a tolerance and a parking type, among what stands
+/// in `lot`. `plan` as in n3p_parker_plan.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn n3p_parker_plan_request(
+    parker: *const n3p_parker,
+    request: *const n3p_request,
+    lot: *const n3p_lot,
+    plan: *mut *mut n3p_plan,
+) -> n3p_status {
+    // SAFETY: the caller's word.
+    let request = || unsafe { to_request(&read(request, "request")?) };
+    // SAFETY: the caller's word.
+    unsafe { plan_in(parker, request, lot, plan) }
+}
+
+/// Plans what `request` comes to.
+///
+/// # Safety
+///
+/// Where it is neither NULL nor misaligned, `plan` leads to room for a handle.
+unsafe fn plan_in(
+    parker: *const n3p_parker,
+    request: impl FnOnce() -> Result<Request>,
+    lot: *const n3p_lot,
+    plan: *mut *mut n3p_plan,
+) -> n3p_status {
+    guarded(|| {
+        // SAFETY: the caller's word.
+        let plan = unsafe { Place::new(plan, "plan") }?;
+        plan.put(ptr::null_mut());
+        let parker = PARKERS.get(parker, "parker")?;
+        let lot = held(lot, "lot")?;
+        let planned = parker.plan_request(&request()?, &lot)?;
+        plan.put(PLANS.open(Kept::new(planned)));
+        Ok(())
+    })
+}
+
+/// Plans a scene, whose vehicle must be the parker's. `plan` as in n3p_parker_plan.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn n3p_parker_plan_scene(
+    parker: *const n3p_parker,
+    scene: *const n3p_scene,
+    plan: *mut *mut n3p_plan,
+) -> n3p_status {
+    guarded(|| {
+        // SAFETY: the caller's word.
+        let plan = unsafe { Place::new(plan, "plan") }?;
+        plan.put(ptr::null_mut());
+        let parker = PARKERS.get(parker, "parker")?;
+        let planned = parker.plan_scene(SCENES.get(scene, "scene")?.as_ref())?;
+        plan.put(PLANS.open(Kept::new(planned)));
+        Ok(())
+    })
+}
+
+/// Plans `count` requests by all cores, each in its lot, which several may share; the plans are the
+/// same as one by one. `plans` and `statuses`, which may be NULL, have room for as many: of a
+/// request that has no plan, the plan is NULL and the status says why.
+///
+/// Returns N3P_OK where all have plans, and else the status of the first that has none, which the
+/// message is about. Where an argument cannot be used nothing is planned: all plans are NULL, and
+/// all statuses are what is returned.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn n3p_parker_plan_batch(
+    parker: *const n3p_parker,
+    requests: *const n3p_request,
+    lots: *const *const n3p_lot,
+    count: usize,
+    plans: *mut *mut n3p_plan,
+    statuses: *mut n3p_status,
+) -> n3p_status {
+    // SAFETY: the caller's word.
+    let (plans, statuses) = match unsafe { places(plans, statuses, count) } {
+        Ok(places) => places,
+        Err(failure) => return guarded(|| Err(failure)),
+    };
+    let put = |i: usize, plan, status| {
+        plans[i].put(plan);
+        if let Some(place) = statuses.get(i) {
+            place.put(status);
+        }
+    };
+    // So that nothing is left undefined, whatever happens.
+    (0..count).for_each(|i| put(i, ptr::null_mut(), n3p_status::N3P_INTERNAL));
+    let mut results = Vec::new();
+    let status = guarded(|| {
+        let parker = PARKERS.get(parker, "parker")?;
+        // SAFETY: the caller's word.
+        results = unsafe { planned(&parker, requests, lots, count) }?;
+        Ok(())
+    });
+    if status != n3p_status::N3P_OK {
+        (0..count).for_each(|i| put(i, ptr::null_mut(), status));
+        return status;
+    }
+    guarded(|| {
+        let mut first = Ok(());
+        for (i, result) in results.into_iter().enumerate() {
+            match result {
+                Ok(plan) => put(i, PLANS.open(Kept::new(plan)), n3p_status::N3P_OK),
+                Err(error) => {
+                    let Failure { status, message } = error.into();
+                    put(i, ptr::null_mut(), status);
+                    let message = format!("requests[{i}]: {message}");
+                    first = first.and(Err(Failure { status, message }));
+                }
+            }
+        }
+        first
+    })
+}
+
+type Places<T> = Vec<Place<T>>;
+
+/// Where the results of a batch go; no statuses where nobody asks for them.
+///
+/// # Safety
+///
+/// Where they are neither NULL nor misaligned, both lead to room for `count` values.
+unsafe fn places(
+    plans: *mut *mut n3p_plan,
+    statuses: *mut n3p_status,
+    count: usize,
+) -> Result<(Places<*mut n3p_plan>, Places<n3p_status>)> {
+    if count > N3P_MAX_COUNT {
+        let text = format!("count is {count}; expected at most {N3P_MAX_COUNT}");
+        return Err(Failure::bad_input(text));
+    }
+    let asked = if statuses.is_null() { 0 } else { count };
+    // SAFETY: wrapping, so that these are no promises; `Place` has the caller's word.
+    let plans = (0..count).map(|i| unsafe { Place::new(plans.wrapping_add(i), "plans") });
+    // SAFETY: as above.
+    let statuses = (0..asked).map(|i| unsafe { Place::new(statuses.wrapping_add(i), "statuses") });
+    Ok((plans.collect::<Result<_>>()?, statuses.collect::<Result<_>>()?))
+}
+
+/// The plans of a batch.
+///
+/// # Safety
+///
+/// As [`read_all`] of both arrays, and as [`to_request`] of every request.
+unsafe fn planned(
+    parker: &Parker,
+    requests: *const n3p_request,
+    lots: *const *const n3p_lot,
+    count: usize,
+) -> Result<Vec<std::result::Result<Plan, PlanError>>> {
+    // SAFETY: the caller's word.
+    let (requests, lots) =
+        unsafe { (read_all(requests, count, "requests")?, read_all(lots, count, "lots")?) };
+    let numbered = |what: &str, i: usize| format!("{what}[{i}]");
+    let lots = lots.iter().enumerate().map(|(i, &lot)| held(lot, &numbered("lots", i)));
+    let lots = lots.collect::<Result<Vec<_>>>()?;
+    let requests = requests.iter().enumerate().map(|(i, request)| {
+        // SAFETY: the caller's word.
+        unsafe { to_request(request) }.map_err(|failure| Failure {
+            message: format!("{}: {}", numbered("requests", i), failure.message),
+            ..failure
+        })
+    });
+    let requests = requests.collect::<Result<Vec<_>>>()?;
+    let pairs: Vec<_> = zip(requests, lots.iter().map(AsRef::as_ref)).collect();
+    Ok(parker.plan_batch(&pairs))
+}
+
+/// # Safety
+///
+/// Where they are neither NULL nor misaligned, the request's goals lead to as many poses as it says.
+unsafe fn to_request(request: &n3p_request) -> Result<Request> {
+    let count = request.goal_count;
+    if !(1..=Scene::MAX_GOALS).contains(&count) {
+        let most = Scene::MAX_GOALS;
+        return Err(Failure::bad_input(format!("goal_count is {count}; expected 1 to {most}")));
+    }
+    // SAFETY: the caller's word.
+    let goals = unsafe { read_all(request.goals, count, "goals") }?;
+    let (position_m, heading_rad) = (request.position_tolerance, request.heading_tolerance);
+    let exact = position_m == 0.0 && heading_rad == 0.0;
+    Ok(Request {
+        start: request.start.into(),
+        goals: goals.iter().map(|&goal| Pose::from(goal)).collect(),
+        tolerance: (!exact).then_some(GoalTolerance { position_m, heading_rad }),
+        parking_type: parking_type(request.parking_type)?,
+    })
+}

@@ -1,0 +1,138 @@
+//! What was planned.
+
+use std::ffi::c_char;
+use std::iter;
+use std::sync::OnceLock;
+
+use n3p::Plan;
+use n3p::curves::TrajectoryLimits;
+use n3p::output::PathFile;
+
+use super::handles::Table;
+use super::memory::{Place, fill, read_or};
+use super::status::{Failure, guarded, n3p_status};
+use super::types::{
+    n3p_limits, n3p_limits_default, n3p_moment, n3p_path_pose, n3p_summary, parking_number,
+    short_name,
+};
+
+/// A path that the exact swept check has passed, and how it came about.
+pub enum n3p_plan {}
+
+pub(crate) static PLANS: Table<Kept> = Table::new("n3p_plan", 4);
+
+/// A plan, with its poses from when somebody asks for them: who asks for their number first asks
+/// twice.
+pub(crate) struct Kept {
+    plan: Plan,
+    poses: OnceLock<PathFile>,
+}
+
+impl Kept {
+    pub fn new(plan: Plan) -> Self {
+        Self { plan, poses: OnceLock::new() }
+    }
+
+    fn poses(&self) -> &PathFile {
+        self.poses.get_or_init(|| self.plan.poses())
+    }
+}
+
+/// Frees a plan; NULL is none.
+#[unsafe(no_mangle)]
+pub extern "C" fn n3p_plan_free(plan: *mut n3p_plan) -> n3p_status {
+    guarded(|| PLANS.close(plan))
+}
+
+/// What the plan came to.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn n3p_plan_summary(
+    plan: *const n3p_plan,
+    summary: *mut n3p_summary,
+) -> n3p_status {
+    guarded(|| {
+        // SAFETY: the caller's word.
+        let summary = unsafe { Place::new(summary, "summary") }?;
+        let plan = &PLANS.get(plan, "plan")?.plan;
+        summary.put(n3p_summary {
+            length: plan.length(),
+            margin: plan.margin(),
+            direction_changes: plan.direction_changes(),
+            expansions: plan.expansions(),
+            goal_index: plan.goal_index(),
+            parking_type: parking_number(plan.parking_type()),
+            method: short_name(plan.method().name()),
+            route: short_name(plan.route().map_or("", |route| route.name())),
+        });
+        Ok(())
+    })
+}
+
+/// Writes the path to `buffer`, which has room for `capacity` poses: poses at most 5 cm apart, the
+/// first the start. `count` becomes their number; where that is more than `capacity`, nothing else
+/// is written and the function returns N3P_BUFFER_TOO_SMALL. NULL with a capacity of 0 asks for the
+/// number alone.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn n3p_plan_poses(
+    plan: *const n3p_plan,
+    buffer: *mut n3p_path_pose,
+    capacity: usize,
+    count: *mut usize,
+) -> n3p_status {
+    guarded(|| {
+        let plan = PLANS.get(plan, "plan")?;
+        let file = plan.poses();
+        let poses = (0..file.poses.len()).map(|i| {
+            let [x, y, heading] = file.poses[i];
+            n3p_path_pose { x, y, heading, steer: file.steer[i], gear: file.gears[i].into() }
+        });
+        // SAFETY: the caller's word.
+        unsafe { fill(poses, buffer, capacity, count) }
+    })
+}
+
+/// Writes the path in time to `buffer`, as n3p_plan_poses does: moments 0.05 s apart, and the end.
+/// NULL limits are those of n3p_limits_default.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn n3p_plan_trajectory(
+    plan: *const n3p_plan,
+    limits: *const n3p_limits,
+    buffer: *mut n3p_moment,
+    capacity: usize,
+    count: *mut usize,
+) -> n3p_status {
+    guarded(|| {
+        let plan = PLANS.get(plan, "plan")?;
+        // SAFETY: the caller's word.
+        let limits = unsafe { read_or(limits, "limits", n3p_limits_default()) }?;
+        let driven = plan
+            .plan
+            .trajectory(&TrajectoryLimits::from(limits))
+            .map_err(|e| Failure::bad_input(format!("limits: {e}")))?;
+        // SAFETY: the caller's word.
+        unsafe { fill(driven.moments.iter().map(n3p_moment::from), buffer, capacity, count) }
+    })
+}
+
+/// Writes the path to `buffer` as the JSON of path files (docs/formats.md), byte by byte what
+/// n3p-plan --out writes, and a NUL. `length` becomes the number of bytes without the NUL: the
+/// buffer needs a capacity of one more. Otherwise as n3p_plan_poses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn n3p_plan_json(
+    plan: *const n3p_plan,
+    buffer: *mut c_char,
+    capacity: usize,
+    length: *mut usize,
+) -> n3p_status {
+    guarded(|| {
+        // SAFETY: the caller's word.
+        let place = unsafe { Place::new(length, "length") }?;
+        let plan = PLANS.get(plan, "plan")?;
+        let bytes: Vec<u8> = plan.poses().to_json().into_bytes();
+        let (needed, mut with_nul) = (bytes.len(), 0);
+        let chars: Vec<c_char> = bytes.iter().map(|&b| b as c_char).chain(iter::once(0)).collect();
+        place.put(needed);
+        // SAFETY: the caller's word for `buffer`.
+        unsafe { fill(chars.into_iter(), buffer, capacity, &mut with_nul) }
+    })
+}

@@ -1,0 +1,74 @@
+//! Scenes: vehicle, start, goals and lot, as files hold them.
+
+use std::ffi::c_char;
+use std::path::Path;
+
+use n3p::world::Scene;
+
+use super::handles::Table;
+use super::memory::{Place, read_all, read_text};
+use super::status::{Failure, guarded, n3p_status};
+use super::types::n3p_vehicle;
+
+/// A scene: a vehicle, its start and goals, and what stands around them.
+pub enum n3p_scene {}
+
+pub(crate) static SCENES: Table<Scene> = Table::new("n3p_scene", 2);
+
+/// Reads a scene from a file, `.json` (docs/formats.md) or `.csv` (TPCAP); to be freed by
+/// n3p_scene_free.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn n3p_scene_read(
+    file: *const c_char,
+    scene: *mut *mut n3p_scene,
+) -> n3p_status {
+    guarded(|| {
+        // SAFETY: the caller's word.
+        let (file, scene) = unsafe { (read_text(file, "file"), Place::new(scene, "scene")?) };
+        scene.put(std::ptr::null_mut());
+        let read = Scene::read(Path::new(file?)).map_err(|e| Failure::bad_input(e.to_string()))?;
+        scene.put(SCENES.open(read));
+        Ok(())
+    })
+}
+
+/// Reads a scene from `length` bytes of JSON (docs/formats.md); to be freed by n3p_scene_free.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn n3p_scene_from_json(
+    json: *const c_char,
+    length: usize,
+    scene: *mut *mut n3p_scene,
+) -> n3p_status {
+    guarded(|| {
+        // SAFETY: the caller's word.
+        let (json, scene) =
+            unsafe { (read_all(json.cast::<u8>(), length, "json"), Place::new(scene, "scene")?) };
+        scene.put(std::ptr::null_mut());
+        let json =
+            str::from_utf8(json?).map_err(|_| Failure::bad_input("json is not text (UTF-8)"))?;
+        let read = Scene::from_json(json, Path::new("json"))
+            .map_err(|e| Failure::bad_input(e.to_string()))?;
+        scene.put(SCENES.open(read));
+        Ok(())
+    })
+}
+
+/// Frees a scene; NULL is none.
+#[unsafe(no_mangle)]
+pub extern "C" fn n3p_scene_free(scene: *mut n3p_scene) -> n3p_status {
+    guarded(|| SCENES.close(scene))
+}
+
+/// The scene's vehicle, for which a parker must be made to plan it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn n3p_scene_vehicle(
+    scene: *const n3p_scene,
+    vehicle: *mut n3p_vehicle,
+) -> n3p_status {
+    guarded(|| {
+        // SAFETY: the caller's word.
+        let vehicle = unsafe { Place::new(vehicle, "vehicle") }?;
+        vehicle.put(SCENES.get(scene, "scene")?.vehicle.into());
+        Ok(())
+    })
+}
