@@ -5,7 +5,7 @@ use std::path::Path;
 
 /// Name and content of each.
 #[cfg(feature = "models")]
-pub const FILES: &[(&str, &[u8])] = &[
+pub static FILES: &[(&str, &[u8])] = &[
     ("knn.bin", include_bytes!("../../models/knn.bin")),
     ("knn-tpcap.bin", include_bytes!("../../models/knn-tpcap.bin")),
     ("mlp-forward.safetensors", include_bytes!("../../models/mlp-forward.safetensors")),
@@ -20,7 +20,7 @@ pub const FILES: &[(&str, &[u8])] = &[
 
 /// Nothing is compiled in.
 #[cfg(not(feature = "models"))]
-pub const FILES: &[(&str, &[u8])] = &[];
+pub static FILES: &[(&str, &[u8])] = &[];
 
 /// The model of a bare name.
 pub fn find(name: &Path) -> Option<&'static [u8]> {

@@ -153,6 +153,13 @@ impl Scene {
         Ok(scene)
     }
 
+    /// The scene of the text of a JSON file, validated; `name` stands for the file in messages.
+    pub fn from_json(text: &str, name: &Path) -> Result<Scene, SceneError> {
+        let scene = parse_json(text, name)?;
+        scene.validate(name)?;
+        Ok(scene)
+    }
+
     /// Reads every `.json` and `.csv` file of a folder, in the order of their names.
     /// A scene whose name another one has already is called after its file instead, so
     /// that names are unique. Fails with the first file that is no scene.
