@@ -124,12 +124,12 @@ fn fitting(
     methods: &[Method],
     settings: &Settings<'_, '_>,
 ) -> Result<Models, Fault> {
-    let mut models =
-        settings.models(&cases.first().map_or_else(Default::default, |c| c.scene.vehicle))?;
+    let first = cases.first().map_or_else(Default::default, |c| c.scene.vehicle);
+    let mut models = settings.models(methods, &first)?;
     // The package has a model for any vehicle besides those of some: it is added where one needs it.
     let unserved = |c: &&Case| models.selector(Method::N3P, &c.scene.vehicle).is_none();
     if let Some(case) = cases.iter().find(unserved) {
-        models = settings.models(&case.scene.vehicle)?;
+        models = settings.models(methods, &case.scene.vehicle)?;
     }
     for method in methods {
         method.build(&models, &MethodSettings::default()).map_err(Fault::bad)?;

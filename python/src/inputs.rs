@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyFloat, PyList, PyString, PyTuple, PyType};
@@ -78,17 +78,21 @@ pub fn numbers<const N: usize>(object: &Bound<'_, PyAny>) -> Found<[f64; N]> {
     } else {
         let array = floats(object, || format!("{N} numbers"))?;
         let array = array.cast::<PyArray1<f64>>().map_err(|_| wrong())?;
-        let array = array.try_readonly().map_err(Wrong::new)?;
-        if array.as_array().len() != N {
+        if array.len() != N {
             return Err(wrong());
         }
-        row.iter_mut().zip(array.as_array()).for_each(|(value, given)| *value = *given);
+        // SAFETY: as in `rows_of`.
+        let view = unsafe { array.as_array() };
+        row.iter_mut().zip(view).for_each(|(value, given)| *value = *given);
     }
     Ok(row)
 }
 
 /// Any number of rows of `N` numbers each.
 pub fn rows<const N: usize>(object: &Bound<'_, PyAny>) -> Found<Vec<[f64; N]>> {
+    if let Ok(array) = object.cast::<PyArray2<f64>>() {
+        return rows_of(array);
+    }
     if let Ok(list) = object.cast::<PyList>() {
         let item = |(i, item)| numbers(&item).map_err(|w| w.inside(i));
         return list.iter().enumerate().map(item).collect();
@@ -102,13 +106,20 @@ pub fn rows<const N: usize>(object: &Bound<'_, PyAny>) -> Found<Vec<[f64; N]>> {
         return Ok(Vec::new());
     }
     let shape = array.getattr("shape").map_err(Wrong::new)?;
-    let wrong = || Wrong::new(format!("has shape {shape}; expected (any, {N})"));
-    let array: PyReadonlyArray2<'_, f64> =
-        array.cast::<PyArray2<f64>>().map_err(|_| wrong())?.try_readonly().map_err(Wrong::new)?;
-    let view = array.as_array();
-    if view.ncols() != N {
-        return Err(wrong());
+    rows_of(
+        array.cast().map_err(|_| Wrong::new(format!("has shape {shape}; expected (any, {N})")))?,
+    )
+}
+
+fn rows_of<const N: usize>(array: &Bound<'_, PyArray2<f64>>) -> Found<Vec<[f64; N]>> {
+    let shape = array.shape();
+    if shape[1] != N && shape[0] > 0 {
+        let [rows, columns] = [shape[0], shape[1]];
+        return Err(Wrong::new(format!("has shape ({rows}, {columns}); expected (any, {N})")));
     }
+    // SAFETY: the values are copied before anything of Python's runs that could write to them; a
+    // borrow that numpy's Rust side keeps book of would cost as much as the copy.
+    let view = unsafe { array.as_array() };
     Ok(view.rows().into_iter().map(|row| std::array::from_fn(|i| row[i])).collect())
 }
 

@@ -53,10 +53,14 @@ pub struct Settings<'a, 'py> {
 }
 
 impl Settings<'_, '_> {
-    /// The models, for a car of these: given files, or those of the package.
-    pub fn models(&self, vehicle: &n3p::Vehicle) -> Result<Models, Fault> {
+    /// The models for `methods` with a car: given files, or those of the package.
+    pub fn models(&self, methods: &[Method], vehicle: &n3p::Vehicle) -> Result<Models, Fault> {
         let Some(files) = self.models else {
-            return Models::compiled_in(vehicle).map_err(Fault::bad);
+            // Only the paper's own row of the network needs more than `n3p` does.
+            return match methods.contains(&Method::MLP_N3P) {
+                true => Models::usual(methods, Some(vehicle)).map_err(Fault::bad),
+                false => Models::compiled_in(vehicle).map_err(Fault::bad),
+            };
         };
         let wrong = || Fault::bad("models: expected a list of paths");
         if files.is_instance_of::<PyString>() {
@@ -98,7 +102,7 @@ impl Parker {
         let vehicle = self::vehicle(vehicle)?;
         let method: Method = method.parse().map_err(|e| Fault::bad(format!("method: {e}")))?;
         let settings = Settings { models, effort, max_expansions };
-        let (models, budget) = (settings.models(&vehicle)?, settings.budget()?);
+        let (models, budget) = (settings.models(&[method], &vehicle)?, settings.budget()?);
         let made = py.detach(|| guarded(|| n3p::Parker::by(method, vehicle, models)))?;
         Ok(Self(made?.margin(margin)?.allow_contact(allow_contact)?.budget(budget)))
     }
