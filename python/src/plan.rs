@@ -63,6 +63,9 @@ pub fn table<T: Element>(
     PyArray1::from_vec(py, flat).reshape([count, width]).expect("as many values")
 }
 
+/// Name and value of a column.
+type Column = (&'static str, fn(&Moment) -> f64);
+
 fn frozen1<T: Element>(array: Bound<'_, PyArray1<T>>) -> Py<PyArray1<T>> {
     array.readwrite().make_nonwriteable();
     array.unbind()
@@ -195,7 +198,7 @@ impl Plan {
         };
         let driven = guarded(|| self.plan.trajectory(&limits))?.map_err(Fault::bad)?;
         let columns = PyDict::new(py);
-        let numbers: [(&str, fn(&Moment) -> f64); 9] = [
+        let numbers: [Column; 9] = [
             ("time_s", |m| m.time),
             ("x_m", |m| m.pose.x),
             ("y_m", |m| m.pose.y),

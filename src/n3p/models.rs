@@ -301,7 +301,7 @@ fn knn_of_other_vehicles() -> Vec<PathBuf> {
 /// compiled in.
 pub(super) fn named(passes: impl Fn(&str) -> bool) -> Vec<PathBuf> {
     let entries = std::fs::read_dir("models").into_iter().flatten();
-    let in_folder = entries.filter_map(|e| Some(e.ok()?.file_name().into_string().ok()?));
+    let in_folder = entries.filter_map(|e| e.ok()?.file_name().into_string().ok());
     let compiled_in = shipped::FILES.iter().map(|(name, _)| (*name).to_owned());
     let names: BTreeSet<String> = in_folder.chain(compiled_in).filter(|n| passes(n)).collect();
     names.into_iter().map(find_model).collect()
