@@ -116,6 +116,10 @@ impl Parker {
         Self { terms: Terms { contact: metres, ..self.terms }, ..self }.checked()
     }
 
+    /// Planners kept for later calls, at most: after a crowd of callers the rest would only hold
+    /// memory, about 100 kB each.
+    const KEPT: usize = 64;
+
     fn checked(self) -> Result<Self, ParkerError> {
         self.terms.check().map_err(ParkerError::Terms)?;
         Ok(self)
@@ -153,7 +157,10 @@ impl Parker {
         }
         let mut planner = self.borrow();
         let planned = self.plan_by(planner.as_mut(), scene);
-        self.idle.lock().unwrap_or_else(|e| e.into_inner()).push(planner);
+        let mut idle = self.idle.lock().unwrap_or_else(|e| e.into_inner());
+        if idle.len() < Self::KEPT {
+            idle.push(planner);
+        }
         planned
     }
 

@@ -24,7 +24,9 @@ def tell(what, plan):
     for at in (0, len(plan) // 2, -1):
         x, y, heading = plan.poses[at]
         gear = "forward" if plan.gears[at] > 0 else "backward"
-        print(f"  x {x:6.2f}  y {y:5.2f}  heading {heading:5.2f}  {gear}, steer {plan.steer[at]:5.2f}")
+        print(
+            f"  x {x:6.2f}  y {y:5.2f}  heading {heading:5.2f}  {gear}, steer {plan.steer[at]:5.2f}"
+        )
 
 
 def occupancy(resolution, origin, shape):

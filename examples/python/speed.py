@@ -92,7 +92,9 @@ def main():
             envs.step(action)
         wall, cpu = time.perf_counter() - start, time.process_time() - cpu
         steps = actions.shape[0] * actions.shape[1]
-        print(f"64 environments, {course}: {steps / wall:.0f} steps/s, {steps / cpu:.0f} per CPU second")
+        print(
+            f"64 environments, {course}: {steps / wall:.0f} steps/s, {steps / cpu:.0f} per CPU second"
+        )
 
 
 if __name__ == "__main__":

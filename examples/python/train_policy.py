@@ -22,7 +22,7 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-import n3p.gym  # noqa: F401: registers the environment
+import n3p.gym  # noqa: F401 (registers the environment)
 
 ENVIRONMENTS, STEPS = 64, 64
 EPOCHS, BATCH = 4, 1024
@@ -181,7 +181,9 @@ def train(minutes, course, seed):
             bar = "#" * round(40 * share)
             print(f"{steps:9,} steps  {100 * share:5.1f} % parked  {bar}", flush=True)
     seconds = time.monotonic() - start
-    print(f"{steps:,} steps in {seconds:.0f} s, {steps / seconds:,.0f} per second, learning included")
+    print(
+        f"{steps:,} steps in {seconds:.0f} s, {steps / seconds:,.0f} per second, learning included"
+    )
     return policy, curve
 
 
@@ -256,7 +258,7 @@ def write_svg(curve, path):
     path.write_text(
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" '
         f'font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="white"/>'
-        f"{lines}<polyline points=\"{points}\" fill=\"none\" stroke=\"#1f5fbf\" stroke-width=\"2\"/>"
+        f'{lines}<polyline points="{points}" fill="none" stroke="#1f5fbf" stroke-width="2"/>'
         f'<text x="{width - edge}" y="{height - 12}" text-anchor="end">{most:,} steps</text>'
         f'<text x="{edge}" y="20">episodes parked</text></svg>\n'
     )

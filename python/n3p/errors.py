@@ -1,5 +1,7 @@
 """What goes wrong."""
 
+from __future__ import annotations
+
 __all__ = ["N3PError", "BadInput", "NoPath"]
 
 
@@ -20,9 +22,9 @@ class NoPath(N3PError):
         "budget spent", "no path at this resolution", "goal not reachable from the start", …
     """
 
-    def __init__(self, reason):
+    def __init__(self, reason: str) -> None:
         super().__init__(f"no path: {reason}")
         self.reason = reason
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[type[NoPath], tuple[str]]:
         return type(self), (self.reason,)

@@ -22,6 +22,7 @@ from gymnasium.error import ClosedEnvironmentError
 from gymnasium.spaces import Box, Dict
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
+from numpy.typing import ArrayLike, NDArray
 
 from n3p._n3p import Environments
 from n3p.errors import BadInput
@@ -114,7 +115,9 @@ class ParkingEnv(gymnasium.Env):
             raise ClosedEnvironmentError("the environment was closed; make another one")
         return self._environments
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         """Begins the next episode; with a seed, the first of that seed."""
         super().reset(seed=seed)
         first = seed is not None or not self._seeded
@@ -124,7 +127,9 @@ class ParkingEnv(gymnasium.Env):
         observation = _single(self._open().reset(own))
         return observation, {"mask": observation["mask"], "scripted": False}
 
-    def step(self, action):
+    def step(
+        self, action: ArrayLike
+    ) -> tuple[dict[str, NDArray[Any]], float, bool, bool, dict[str, Any]]:
         """Drives one step of half a second."""
         seen, (rewards, ends, scripted, driven), _ = self._open().step(
             np.asarray(action)[np.newaxis]
@@ -208,7 +213,9 @@ class ParkingVectorEnv(VectorEnv):
         """Infos that every environment has."""
         return {**values, **{f"_{name}": self._all.copy() for name in values}}
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         """Begins the next episodes; with a seed, the first ones of that seed.
 
         ``options={"reset_mask": mask}``, bool (num_envs,), begins only those that are True.
@@ -225,7 +232,9 @@ class ParkingVectorEnv(VectorEnv):
             mask=observation["mask"], scripted=np.zeros(self.num_envs, np.bool_)
         )
 
-    def step(self, actions):
+    def step(
+        self, actions: ArrayLike
+    ) -> tuple[dict[str, NDArray[Any]], NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
         """Drives one step of half a second everywhere."""
         seen, (rewards, ends, scripted, driven), lasts = self._open().step(actions)
         observation = _dict(seen)
@@ -246,12 +255,12 @@ class ParkingVectorEnv(VectorEnv):
         self._environments = None
 
 
-def _dict(seen) -> dict[str, np.ndarray]:
+def _dict(seen: tuple[NDArray[Any], ...]) -> dict[str, NDArray[Any]]:
     lidar, target, mask = seen
     return {"lidar": lidar, "target": target, "mask": mask}
 
 
-def _single(seen) -> dict[str, np.ndarray]:
+def _single(seen: tuple[NDArray[Any], ...]) -> dict[str, NDArray[Any]]:
     return {name: values[0] for name, values in _dict(seen).items()}
 
 

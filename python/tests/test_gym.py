@@ -172,7 +172,17 @@ def test_no_number_of_environments(count):
 
 @pytest.mark.parametrize(
     "wrong",
-    [None, "left", 3, [1, 2, 3], np.zeros((3, 2)), np.zeros(3), [np.nan, 0], [0, np.inf], ["a", "b"]],
+    [
+        None,
+        "left",
+        3,
+        [1, 2, 3],
+        np.zeros((3, 2)),
+        np.zeros(3),
+        [np.nan, 0],
+        [0, np.inf],
+        ["a", "b"],
+    ],
     ids=str,
 )
 def test_no_action(wrong):

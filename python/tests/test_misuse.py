@@ -101,7 +101,9 @@ def test_no_polygons(parker, polygons):
 def test_the_message_says_where(parker):
     with pytest.raises(n3p.BadInput, match=r"^polygons\[1\]\[2\]\[0\]: is 'a' \(str\)"):
         parker.plan(START, GOAL, polygons=[POLYGONS[0], [(0, 0), (1, 1), ("a", 2)]])
-    with pytest.raises(n3p.BadInput, match=r"^polygons\[0\]: has shape \(4, 3\); expected \(any, 2\)"):
+    with pytest.raises(
+        n3p.BadInput, match=r"^polygons\[0\]: has shape \(4, 3\); expected \(any, 2\)"
+    ):
         parker.plan(START, GOAL, polygons=[np.zeros((4, 3))])
     with pytest.raises(n3p.BadInput, match=r"obstacles\[0\]\[1\]"):
         parker.plan(START, GOAL, polygons=[[(0, 0), (1, NAN), (2, 2)]])
@@ -162,7 +164,20 @@ def test_goals_are_one_or_more(parker):
 
 @pytest.mark.parametrize(
     "scene",
-    [None, 3, [], b"x", Odd(), {}, {"start": 3}, {1: 2}, {"vehicle": itself}, "missing.json", "", "\0"],
+    [
+        None,
+        3,
+        [],
+        b"x",
+        Odd(),
+        {},
+        {"start": 3},
+        {1: 2},
+        {"vehicle": itself},
+        "missing.json",
+        "",
+        "\0",
+    ],
     ids=str,
 )
 def test_no_scene(parker, scene):
@@ -306,7 +321,7 @@ def test_a_thousand_threads_share_one_parker(parker):
             parker.plan(START, GOAL, polygons=[shared])
             with pytest.raises(n3p.BadInput):
                 parker.plan(START, None, polygons=[shared])
-        except BaseException as error:  # noqa: BLE001: whatever it is, the test must hear of it
+        except BaseException as error:  # whatever it is, the test must hear of it
             errors.append(error)
 
     threads = [threading.Thread(target=work, args=(i,)) for i in range(1000)]

@@ -30,7 +30,9 @@ def test_stubs_say_what_there_is():
 
     assert (PACKAGE / "py.typed").is_file()
     tree = ast.parse((PACKAGE / "_n3p.pyi").read_text())
-    stubs = {node.name: node for node in tree.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))}
+    stubs = {
+        node.name: node for node in tree.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))
+    }
     for name in public(_n3p):
         thing = getattr(_n3p, name)
         if not callable(thing):

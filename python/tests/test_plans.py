@@ -117,7 +117,10 @@ def test_goals_tolerance_and_type_are_heard(parker):
     for tolerance in ((0.3, 0.1), {"position_m": 0.3, "heading_rad": 0.1}):
         plan = parker.plan(START, GOAL, polygons=POLYGONS, tolerance=tolerance)
         assert np.hypot(*(plan.poses[-1] - GOAL)[:2]) <= 0.3 + 1e-9
-    assert parker.plan(START, GOAL, polygons=POLYGONS, parking_type="reverse").parking_type == "reverse"
+    assert (
+        parker.plan(START, GOAL, polygons=POLYGONS, parking_type="reverse").parking_type
+        == "reverse"
+    )
 
 
 def test_a_batch_is_one_by_one(parker):

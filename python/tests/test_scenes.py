@@ -18,7 +18,11 @@ def test_a_scene_is_its_dict_and_its_file():
     assert scene == n3p.load_scene(str(REVERSE)) == n3p.Scene.from_json(REVERSE.read_text())
     assert dict(scene) == scene.to_dict() and n3p.Scene.from_dict(dict(scene)) == scene
     assert scene == scene.to_dict() and scene != dict(scene, start=[0, 0, 0]) and scene != 3
-    assert scene["start"] == scene.start.tolist() and "goal" in scene and len(scene) == len(list(scene))
+    assert (
+        scene["start"] == scene.start.tolist()
+        and "goal" in scene
+        and len(scene) == len(list(scene))
+    )
     assert scene.to_json() + "\n" == REVERSE.read_text()
     assert [o.tolist() for o in scene.obstacles] == scene["obstacles"]
     for same in (pickle.loads(pickle.dumps(scene)), copy.deepcopy(scene)):
@@ -40,7 +44,9 @@ def test_dicts_may_hold_arrays():
 
 
 def test_a_scene_of_arguments_plans_the_same(parker):
-    lot = dict(polygons=POLYGONS, polylines=[[(-15, 9.5), (15, 9.5), (15, 12)]], points=[(12.0, 8.0)])
+    lot = dict(
+        polygons=POLYGONS, polylines=[[(-15, 9.5), (15, 9.5), (15, 12)]], points=[(12.0, 8.0)]
+    )
     scene = parker.scene(START, GOAL, name="bay", **lot)
     assert scene.name == "bay" and scene.points.shape == (1, 2) and len(scene.obstacles) == 4
     assert parker.plan_scene(scene).to_json() == parker.plan(START, GOAL, **lot).to_json()
@@ -90,7 +96,10 @@ def test_rows_are_columns():
     assert rows["method"].tolist() == ["n3p", "ha-rs", "sha"] * 5
     fine = rows["method"] != "sha"
     assert rows["ok"][fine].all() and not rows["ok"][~fine].any()
-    assert np.isnan(rows["length_m"][~fine]).all() and (rows["reason"][~fine] == "not applicable").all()
+    assert (
+        np.isnan(rows["length_m"][~fine]).all()
+        and (rows["reason"][~fine] == "not applicable").all()
+    )
     assert rows["cost_over_best"][fine].min() == 1.0 and (rows["plan_time_s"] > 0).all()
     assert rows["level"].tolist()[-1] == "" and (rows["checked"][fine] == "certified").all()
     for threads in (2, 7):
