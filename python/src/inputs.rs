@@ -90,9 +90,6 @@ pub fn numbers<const N: usize>(object: &Bound<'_, PyAny>) -> Found<[f64; N]> {
 
 /// Any number of rows of `N` numbers each.
 pub fn rows<const N: usize>(object: &Bound<'_, PyAny>) -> Found<Vec<[f64; N]>> {
-    if let Ok(array) = object.cast::<PyArray2<f64>>() {
-        return rows_of(array);
-    }
     if let Ok(list) = object.cast::<PyList>() {
         let item = |(i, item)| numbers(&item).map_err(|w| w.inside(i));
         return list.iter().enumerate().map(item).collect();
@@ -100,6 +97,9 @@ pub fn rows<const N: usize>(object: &Bound<'_, PyAny>) -> Found<Vec<[f64; N]>> {
     if let Ok(tuple) = object.cast::<PyTuple>() {
         let item = |(i, item)| numbers(&item).map_err(|w| w.inside(i));
         return tuple.iter().enumerate().map(item).collect();
+    }
+    if let Ok(array) = object.cast::<PyArray2<f64>>() {
+        return rows_of(array);
     }
     let array = floats(object, || format!("rows of {N} numbers"))?;
     if array.len().is_ok_and(|len| len == 0) {
