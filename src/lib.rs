@@ -33,7 +33,7 @@ pub mod curves;
 pub mod episode;
 pub mod files;
 pub mod geometry;
-#[cfg(feature = "lab")]
+#[cfg(feature = "environment")]
 pub mod lab;
 pub mod n3p;
 pub mod output;

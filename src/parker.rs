@@ -1,5 +1,6 @@
 //! The planner to embed: made once for a vehicle, asked as often as one likes.
 
+use std::borrow::Borrow;
 use std::num::NonZero;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -115,6 +116,10 @@ impl Parker {
         Self { terms: Terms { contact: metres, ..self.terms }, ..self }.checked()
     }
 
+    /// Planners kept for later calls, at most: after a crowd of callers the rest would only hold
+    /// memory, about 100 kB each.
+    const KEPT: usize = 64;
+
     fn checked(self) -> Result<Self, ParkerError> {
         self.terms.check().map_err(ParkerError::Terms)?;
         Ok(self)
@@ -152,24 +157,30 @@ impl Parker {
         }
         let mut planner = self.borrow();
         let planned = self.plan_by(planner.as_mut(), scene);
-        self.idle.lock().unwrap_or_else(|e| e.into_inner()).push(planner);
+        let mut idle = self.idle.lock().unwrap_or_else(|e| e.into_inner());
+        if idle.len() < Self::KEPT {
+            idle.push(planner);
+        }
         planned
     }
 
     /// A plan for each request, by all cores; the same as one by one.
     pub fn plan_batch(&self, requests: &[(Request, &Lot)]) -> Vec<Result<Plan, PlanError>> {
-        self.batch(requests.len(), |i| requests[i].1.scene(self.vehicle, &requests[i].0))
+        self.batch(requests.len(), |i| self.plan_request(&requests[i].0, requests[i].1))
     }
 
     /// A plan for each scene, by all cores; the same as one by one.
-    pub fn plan_scenes(&self, scenes: &[Scene]) -> Vec<Result<Plan, PlanError>> {
-        self.batch(scenes.len(), |i| scenes[i].clone())
+    pub fn plan_scenes<S: Borrow<Scene> + Sync>(
+        &self,
+        scenes: &[S],
+    ) -> Vec<Result<Plan, PlanError>> {
+        self.batch(scenes.len(), |i| self.plan_scene(scenes[i].borrow()))
     }
 
     fn batch(
         &self,
         count: usize,
-        scene: impl Fn(usize) -> Scene + Sync,
+        plan: impl Fn(usize) -> Result<Plan, PlanError> + Sync,
     ) -> Vec<Result<Plan, PlanError>> {
         let cores = thread::available_parallelism().map_or(1, NonZero::get);
         let next = AtomicUsize::new(0);
@@ -180,7 +191,7 @@ impl Parker {
                 if i >= count {
                     return done;
                 }
-                done.push((i, self.plan_scene(&scene(i))));
+                done.push((i, plan(i)));
             }
         };
         let mut plans = thread::scope(|scope| {
@@ -330,8 +341,8 @@ impl Lot {
         self
     }
 
-    /// The scene of a request in this lot.
-    fn scene(&self, vehicle: Vehicle, request: &Request) -> Scene {
+    /// The scene of a request in this lot: what [`Parker::plan_request`] plans.
+    pub fn scene(&self, vehicle: Vehicle, request: &Request) -> Scene {
         let first = request.goals.first().copied();
         Scene {
             name: String::new(),

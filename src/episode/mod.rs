@@ -1,10 +1,12 @@
 //! One episode: one method on one scene, timed, checked and told.
 
 mod clearance;
+pub mod comparison;
 mod row;
 mod spot_report;
 
 pub use clearance::{Clearance, WAY_ENDS};
+pub use comparison::fill;
 pub use row::Row;
 pub use spot_report::{SpotReport, abstraction, regions};
 

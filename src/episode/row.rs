@@ -42,8 +42,8 @@ pub struct Row {
     pub checked: String,
     /// How a guided planner came to its path: `library`, `direct`, `searched`, `fallback`.
     pub route: String,
-    /// Cost of the path over that of the cheapest in the scene: see `lab::evaluation::quality`, which
-    /// fills this and the next once a run is complete.
+    /// Cost of the path over that of the cheapest in the scene: [`fill`](super::fill) writes this and
+    /// the next once a run is complete.
     pub cost_over_best: Option<f64>,
     /// Gear changes beyond the fewest of any method in the scene.
     pub changes_over_fewest: Option<u32>,

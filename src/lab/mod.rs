@@ -9,12 +9,21 @@
 //! - [`training`]: rows → artefacts
 //! - [`evaluation`]: the independent oracle, rows, tables, reports
 //! - [`experiments`]: a whole pipeline from one versioned file
+//!
+//! The feature `environment` alone has the environment of [`rl`], and nothing else of all this.
 
+#[cfg(feature = "lab")]
 pub mod dataset;
+#[cfg(feature = "lab")]
 pub mod evaluation;
+#[cfg(feature = "lab")]
 pub mod experiments;
+#[cfg(feature = "lab")]
 pub mod nn;
+#[cfg(feature = "lab")]
 pub mod progress;
 pub mod rl;
+#[cfg(feature = "lab")]
 pub mod toml_file;
+#[cfg(feature = "lab")]
 pub mod training;

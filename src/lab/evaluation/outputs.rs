@@ -6,12 +6,10 @@ use std::path::{Path, PathBuf};
 
 use super::html;
 use super::learning_curve::CurvePoint;
-use super::quality;
 use super::report::{self, Provenance};
 use super::rows::{self, RowWriter, RowsError};
 use super::trace::{self, Trace, TraceWriter};
-use crate::episode::Row;
-use crate::episode::{Case, Episode};
+use crate::episode::{self, Case, Episode, Row};
 use crate::files::{reason, remove_leftovers, write_whole};
 use crate::n3p::Models;
 use crate::output::{PathFile, PathFileError};
@@ -121,7 +119,7 @@ impl Outputs {
         Ok(())
     }
 
-    /// Compares the rows of a run that is complete ([`quality::fill`]), then writes `rows.csv`
+    /// Compares the rows of a run that is complete ([`episode::fill`]), then writes `rows.csv`
     /// anew, `rows.parquet`, `report.md` and `report.html`, where an output folder is wanted.
     /// `cases` are the scenes of `rows`; `curve` may be empty.
     pub fn finish(
@@ -132,7 +130,7 @@ impl Outputs {
         curve: &[CurvePoint],
         provenance: &Provenance,
     ) -> Result<(), OutputError> {
-        quality::fill(rows);
+        episode::fill(rows);
         let Some(dir) = self.out else { return Ok(()) };
         rows::write_csv(&dir.join("rows.csv"), rows)?;
         rows::write_parquet(&dir.join("rows.parquet"), rows)?;

@@ -1,8 +1,8 @@
 //! How good paths are: each held against the best that any method of the run found in the same
 //! scene.
 //!
-//! The cost of a path is its length and [`CHANGE_M`] for every change of direction. Means of
-//! lengths hide the scenes in which a method drives a long way round; ratios per scene show them.
+//! Costs are those of [`comparison`](crate::episode::comparison). Means of lengths hide the scenes in
+//! which a method drives a long way round; ratios per scene show them.
 
 use std::collections::HashMap;
 
@@ -11,14 +11,8 @@ use serde::Serialize;
 use super::metrics::{self, percentile};
 use super::table::{Table, kind_name};
 use crate::episode::Row;
+use crate::episode::comparison::{best, measured};
 use crate::world::{Level, ParkingType};
-
-/// What a change of direction costs, in metres of driving; for vehicles of any size.
-pub const CHANGE_M: f64 = 3.0;
-
-/// Costs below this count as this, metres: where the best path is no path at all (start = goal),
-/// ratios stay finite.
-pub const FLOOR_M: f64 = 0.1;
 
 /// How to read the table.
 pub(super) const NOTE: &str = "\
@@ -79,45 +73,7 @@ pub struct QualityGroup {
     pub methods: Vec<MethodQuality>,
 }
 
-/// Length and direction changes of an accepted path.
-fn path(row: &Row) -> Option<(f64, u32)> {
-    Some((row.length_m?, row.direction_changes?)).filter(|_| row.ok)
-}
-
-fn cost(length_m: f64, changes: u32) -> f64 {
-    (length_m + CHANGE_M * f64::from(changes)).max(FLOOR_M)
-}
-
-/// Least cost and fewest changes of each scene that any method solved. They may be of two paths.
-fn best(rows: &[Row]) -> HashMap<&str, (f64, u32)> {
-    let mut best = HashMap::new();
-    for row in rows {
-        let Some((length, changes)) = path(row) else { continue };
-        let (least, fewest) = best.entry(row.scene.as_str()).or_insert((f64::INFINITY, u32::MAX));
-        *least = cost(length, changes).min(*least);
-        *fewest = changes.min(*fewest);
-    }
-    best
-}
-
-/// Cost over the least of the scene, and direction changes beyond the fewest; `None` without an
-/// accepted path.
-fn measured(row: &Row, best: &HashMap<&str, (f64, u32)>) -> Option<(f64, u32)> {
-    let (length, changes) = path(row)?;
-    let (least, fewest) = best[row.scene.as_str()];
-    Some((cost(length, changes) / least, changes - fewest))
-}
-
-/// Fills the columns of all rows that compare them: the rows of a run, complete.
-pub fn fill(rows: &mut [Row]) {
-    let best = best(rows);
-    let values: Vec<_> = rows.iter().map(|row| measured(row, &best)).collect();
-    for (row, value) in rows.iter_mut().zip(values) {
-        (row.cost_over_best, row.changes_over_fewest) = value.unzip();
-    }
-}
-
-/// Compares the methods, over all scenes and by level and type. Rows need not be [`fill`]ed.
+/// Compares the methods, over all scenes and by level and type. Rows need not be filled.
 pub fn summarise(rows: &[Row]) -> Quality {
     let best = best(rows);
     let compared = |methods: &[(&str, Vec<&Row>)]| {
@@ -217,6 +173,7 @@ pub(super) fn numbers(m: &MethodQuality) -> [String; 6] {
 mod tests {
     use super::super::metrics::tests::row;
     use super::*;
+    use crate::episode::fill;
     use crate::planners::NoPath;
     use crate::rng::{Stream, rng};
     use rand::RngExt;

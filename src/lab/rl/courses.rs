@@ -13,9 +13,8 @@ use crate::world::generate::{GeneratorConfig, generate};
 use crate::world::{Level, ParkingType};
 
 /// Where an agent learns.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum,
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(feature = "plan", derive(clap::ValueEnum))]
 #[serde(rename_all = "snake_case")]
 pub enum Course {
     /// In abstracted environments: a lane, a spot, walls around. The paper's RL Simple.

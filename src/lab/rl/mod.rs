@@ -9,22 +9,34 @@
 //! Source: M. Jiang et al., "HOPE: A Reinforcement Learning-based Hybrid Policy Path Planner for
 //! Diverse Parking Scenarios", which the paper compares with.
 
+#[cfg(feature = "lab")]
 pub mod actor;
 pub mod courses;
+#[cfg(feature = "lab")]
 pub mod encoding;
 pub mod lidar;
+#[cfg(feature = "lab")]
 pub mod methods;
 pub mod motion;
+#[cfg(feature = "lab")]
 pub mod network;
+#[cfg(feature = "lab")]
 pub mod onnx;
+#[cfg(feature = "lab")]
 mod onnx_file;
 pub mod parking_env;
+#[cfg(feature = "lab")]
 pub mod policy_file;
+#[cfg(feature = "lab")]
 pub mod process;
+#[cfg(feature = "lab")]
 pub mod replay;
+#[cfg(feature = "lab")]
 pub mod rollout;
+#[cfg(feature = "lab")]
 pub mod sac;
 mod senses;
+#[cfg(feature = "lab")]
 pub mod source;
 
 use rand_chacha::ChaCha8Rng;

@@ -111,9 +111,12 @@ impl ActionMask {
     /// that share of an action never touches anything.
     pub fn shares(&self, problem: &Problem, pose: Pose) -> [f32; MASK] {
         let frame = BodyFrame::new(pose);
+        let collision = &problem.collision;
+        // What one action touches, its neighbours mostly touch too.
+        let mut suspect = None;
         std::array::from_fn(|i| {
-            let sweeps = &self.sweeps[i];
-            let free = |k: u32| problem.collision.sweep_is_free(&frame, &sweeps[k as usize - 1]);
+            let sweep = |k: u32| &self.sweeps[i][k as usize - 1];
+            let free = |k| collision.sweep_is_free_of(&mut suspect, &frame, sweep(k));
             free_parts(free) as f32 / PARTS as f32
         })
     }
