@@ -175,7 +175,9 @@ impl KnnFile {
     /// Checks the content of the file at `path`. The checksum reads every byte anyway, and what is in
     /// memory stays as it was checked, whatever becomes of the file.
     pub fn new(path: &Path, bytes: Cow<'static, [u8]>) -> Result<Self, ArtefactError> {
-        let (header, sections) = check(&bytes).map_err(|fault| fault.of(path))?;
+        // What is compiled in is as whole as the program, and a test has checked it.
+        let is_compiled_in = matches!(bytes, Cow::Borrowed(_));
+        let (header, sections) = check(&bytes, is_compiled_in).map_err(|fault| fault.of(path))?;
         Ok(Self { bytes, path: path.to_owned(), header: Box::new(header), sections })
     }
 
@@ -228,10 +230,7 @@ fn f32_at(bytes: &[u8], at: usize) -> f64 {
     f64::from(f32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes")))
 }
 
-fn check(bytes: &Cow<'static, [u8]>) -> Result<(KnnHeader, Vec<Section>), Fault> {
-    // What is compiled in is as whole as the program, and a test has checked it.
-    let is_compiled_in = matches!(bytes, Cow::Borrowed(_));
-    let bytes: &[u8] = bytes;
+fn check(bytes: &[u8], is_compiled_in: bool) -> Result<(KnnHeader, Vec<Section>), Fault> {
     if bytes.is_empty() {
         return Err(Fault::Empty);
     }
