@@ -1,8 +1,24 @@
 //! N3P: automated parking with a learned preparatory pose.
 //!
 //! The car drives to a *preparatory pose* that a model chose near the spot, and parks from
-//! there along one Reeds-Shepp curve. This crate collects the data, trains the models, plans,
-//! and evaluates.
+//! there along one Reeds-Shepp curve. This crate plans; its laboratory (feature `lab`) collects the
+//! data, trains the models and evaluates.
+//!
+//! Who wants plans makes a [`Parker`] once and asks it as often as needed:
+//!
+//! ```
+//! use n3p::geometry::Pose;
+//! use n3p::{Lot, Parker, Vehicle};
+//!
+//! let parker = Parker::new(Vehicle::default())?;
+//! let mut lot = Lot::new();
+//! lot.polygon([[-4.1, -2.6], [-1.6, -2.6], [-1.6, 2.4], [-4.1, 2.4]]);
+//! lot.polygon([[1.6, -2.6], [4.1, -2.6], [4.1, 2.4], [1.6, 2.4]]);
+//! let goal = Pose::new(0.0, -1.4, std::f64::consts::FRAC_PI_2);
+//! let plan = parker.plan(Pose::new(-9.0, 6.0, 0.0), goal, &lot)?;
+//! println!("{:.1} m, {} changes of gear", plan.length(), plan.direction_changes());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 //!
 //! A scene becomes a [`planners::Problem`]; a [`planners::Planner`] turns it into a
 //! [`curves::Path`]. N3P itself is [`n3p::GuidedPlanner`]. `examples/plan_scene.rs`
@@ -11,7 +27,7 @@
 //!
 //! The modules in reading order; each uses those above it, never one below.
 //!
-//! - [`rng`]: one seed, many named random streams
+//! - `rng` (feature `generate`): one seed, many named random streams
 //! - [`files`]: files that are whole or absent, and plain words for what fails
 //! - [`geometry`]: poses, frames, polygons
 //! - [`vehicle`]: dimensions, footprint, kinematics
@@ -22,8 +38,8 @@
 //! - [`mod@n3p`]: N3P itself, every method by name, and the models that serve a vehicle
 //! - [`output`]: path and trajectory files, pictures
 //! - [`episode`]: one method on one scene, timed and checked
-//! - [`lab`]: what learns and compares: policies, data, training, evaluation, experiments
-//! - [`cli`]: arguments, output and exit codes of the binaries
+//! - `lab` (feature of that name): what learns and compares: policies, data, training, evaluation, experiments
+//! - `cli` (feature `plan`): arguments, output and exit codes of the binaries
 
 #![warn(missing_docs)]
 

@@ -1,7 +1,7 @@
 //! The methods of the tables, by name.
 //!
 //! A method is one [`Entry`]: its names, and how its planner is made. To add one, write its planner
-//! and put an entry into the list that it belongs to ([`SEARCHES`], [`PAPER`], [`OURS`]).
+//! and put an entry into the list that it belongs to (`SEARCHES`, `PAPER`, `OURS`).
 
 use std::fmt;
 use std::hash::{Hash, Hasher};

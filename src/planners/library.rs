@@ -7,7 +7,7 @@
 //! first that is free and reached by a free Reeds-Shepp curve is the plan. Ours; the paper
 //! has one preparatory pose instead.
 //!
-//! Where the manoeuvres come from: [`crate::lab::training::library`].
+//! Where the manoeuvres come from: `lab::training::library`.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

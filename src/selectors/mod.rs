@@ -1,9 +1,9 @@
-//! Preparatory poses: learnt selectors, their artefacts, and N3P itself.
+//! Preparatory poses: learnt selectors and their files.
 //!
 //! A [`PoseSelector`] ranks preparatory poses for [`Features`]; [`knn`] and [`mlp`] are
-//! the two of the paper, [`artefact`] reads and checks their files, and [`guided`] is
-//! N3P: a planner that uses a selector. Read next: [`knn_file`] and [`network`] for what
-//! the files hold.
+//! the two of the paper, [`fleet`] is one for any vehicle. [`artefact`] reads and checks their files,
+//! [`model`] tells them apart, [`shipped`] has those compiled in. Read next: [`knn_file`] and
+//! [`network`] for what the files hold, [`mod@crate::n3p`] for the planner that uses a selector.
 
 pub mod artefact;
 mod features;

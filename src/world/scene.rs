@@ -3,7 +3,7 @@
 //! A scene keeps its own (world) frame and the exact numbers of its file. What
 //! [`Scene::read`] returns has passed [`Scene::validate`]; whether start and goal are
 //! free of obstacles is asked later, by [`Problem`](crate::planners::Problem).
-//! The raw benchmark format is in [`tpcap`], the generator in [`generate`](super::generate).
+//! The raw benchmark format is in [`tpcap`], the generator in `generate`.
 
 use std::collections::HashSet;
 use std::f64::consts::TAU;
