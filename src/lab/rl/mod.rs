@@ -1,7 +1,7 @@
 //! Reinforcement learning: policies, the environment they park in, and the one trained here.
 //!
 //! A [`Policy`] sees an [`Observation`] and answers with an [`Action`]. Policies from elsewhere are
-//! an ONNX file ([`onnx`]) or any program ([`process`]).
+//! an ONNX file (`onnx`) or any program (`process`).
 //!
 //! `senses` makes observations with the [`lidar`] and the mask of [`motion`]; [`parking_env`] is what
 //! agents learn in, on problems of [`courses`].
