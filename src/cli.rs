@@ -7,11 +7,13 @@ use std::fmt::Display;
 use std::io::{self, Write};
 use std::ops::RangeInclusive;
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use clap::error::ErrorKind;
 use tracing_subscriber::filter::LevelFilter;
 
 use crate::files::reason;
+use crate::n3p::{Driver, more};
 use crate::planners::Problem;
 
 /// Exit code of a planner that found no path.
@@ -109,7 +111,6 @@ pub fn run(body: impl FnOnce() -> anyhow::Result<ExitCode>) -> ExitCode {
 }
 
 /// A driving policy from outside.
-#[cfg(feature = "lab")]
 #[derive(clap::Args)]
 pub struct PolicyArgs {
     /// A driving policy from outside, the method "policy": an .onnx file, or the command of a
@@ -121,7 +122,6 @@ pub struct PolicyArgs {
     policy_limit: f64,
 }
 
-#[cfg(feature = "lab")]
 impl PolicyArgs {
     /// Whether there is one.
     pub fn is_given(&self) -> bool {
@@ -129,11 +129,11 @@ impl PolicyArgs {
     }
 
     /// The policy, opened once to see that it can be.
-    pub fn driver(&self) -> anyhow::Result<Option<std::sync::Arc<dyn crate::n3p::Driver>>> {
-        use crate::lab::rl::source::PolicySource;
-        let Some(policy) = &self.policy else { return Ok(None) };
-        let source = PolicySource::new(policy, self.policy_limit).or_bad_input()?;
-        Ok(Some(std::sync::Arc::new(source)))
+    pub fn driver(&self) -> anyhow::Result<Option<Arc<dyn Driver>>> {
+        let open = |policy: &String| {
+            more::open_policy(policy, self.policy_limit).map_err(|e| BadInput(e).into())
+        };
+        self.policy.as_ref().map(open).transpose()
     }
 }
 

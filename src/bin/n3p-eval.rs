@@ -12,7 +12,6 @@ use n3p::lab::evaluation::report::{self, Provenance};
 use n3p::lab::evaluation::suite::{self, SuiteConfig, SuiteError};
 use n3p::lab::evaluation::{Outputs, metrics, quality};
 use n3p::lab::progress;
-use n3p::lab::rl::methods::POLICY;
 use n3p::lab::training;
 use n3p::n3p::{Method, MethodSettings, Models};
 use n3p::planners::goals::Terms;
@@ -112,7 +111,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
         allow_contact_m: args.allow_contact,
         threads: args.threads.into(),
     };
-    if args.policy.is_given() && !config.methods.contains(&POLICY) {
+    if args.policy.is_given() && !config.methods.contains(&Method::POLICY) {
         let text = "--policy: --methods does not name policy; add it there, or leave --policy out";
         return Err(BadInput(text.to_owned()).into());
     }

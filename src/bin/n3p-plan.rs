@@ -3,13 +3,10 @@
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
 
 use anyhow::Result;
 use clap::Parser;
-#[cfg(feature = "lab")]
-use n3p::cli::PolicyArgs;
-use n3p::cli::{self, BadInput, OrBadInput};
+use n3p::cli::{self, BadInput, OrBadInput, PolicyArgs};
 use n3p::curves::TrajectoryLimits;
 use n3p::curves::trajectory::TrajectoryReport;
 use n3p::episode;
@@ -18,7 +15,7 @@ use n3p::output::drawing::{Drawing, scene_svg};
 
 use n3p::files::{check_writable, reason, write_whole};
 use n3p::geometry::{Pose, signed_angle};
-use n3p::n3p::{Driver, Method, MethodSettings, Models, catalogue};
+use n3p::n3p::{Method, MethodSettings, Models, catalogue};
 use n3p::output::TrajectoryFile;
 use n3p::planners::goals::{self, PassedOver, Terms};
 use n3p::planners::{Budget, Effort, Problem, ProblemError};
@@ -43,7 +40,6 @@ struct Args {
     /// mlp-TYPE.safetensors or rl-ENV.safetensors, in the working folder or in models/].
     #[arg(long = "model", value_name = "FILE")]
     models: Vec<String>,
-    #[cfg(feature = "lab")]
     #[command(flatten)]
     policy: PolicyArgs,
     /// Keep so many metres from obstacles, 0 to 1; less along the whole path where start or goal
@@ -259,14 +255,13 @@ fn list_models(json: bool) -> Result<ExitCode> {
 
 /// The method and its models: as told, or the best that fits the scene.
 fn choose(args: &Args, scene: &Scene, problem: &Problem) -> Result<(Method, Models)> {
-    let policy = outside_policy(args)?;
-    let other = policy.as_ref().map_or(Method::N3P, |(method, _)| *method);
-    let method = args.method.unwrap_or(other);
-    if policy.is_some() && method != other {
+    let policy = args.policy.driver()?;
+    let usual = if policy.is_some() { Method::POLICY } else { Method::N3P };
+    let method = args.method.unwrap_or(usual);
+    if policy.is_some() && method != Method::POLICY {
         let text = format!("--policy: --method is {method}, not policy; leave one of them out");
         return Err(BadInput(text).into());
     }
-    let policy = policy.map(|(_, driver)| driver);
     let models = match &args.models[..] {
         [] => Models::usual(&[method], Some(&scene.vehicle)),
         given => Models::load(given),
@@ -287,18 +282,6 @@ fn choose(args: &Args, scene: &Scene, problem: &Problem) -> Result<(Method, Mode
             Ok((Method::HA_RS, models))
         }
     }
-}
-
-/// The policy of --policy, and its method.
-#[cfg(feature = "lab")]
-fn outside_policy(args: &Args) -> Result<Option<(Method, Arc<dyn Driver>)>> {
-    Ok(args.policy.driver()?.map(|driver| (n3p::lab::rl::methods::POLICY, driver)))
-}
-
-/// The planner alone drives with no policy.
-#[cfg(not(feature = "lab"))]
-fn outside_policy(_: &Args) -> Result<Option<(Method, Arc<dyn Driver>)>> {
-    Ok(None)
 }
 
 /// What was found out about goals and contact, on stderr.

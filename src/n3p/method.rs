@@ -10,10 +10,10 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use super::RolloutConfig;
 use super::by_vehicle::ByVehicle;
 use super::guided::{GuidedPlanner, RankedConfig};
 use super::models::{Models, VehicleModels};
-use super::{RolloutConfig, more};
 use crate::planners::{
     HybridAStar, HybridAStarConfig, MultiHeuristicHybridAStar, PlainHybridAStar, Planner,
     ScenarioHybridAStar,
@@ -67,8 +67,12 @@ const HOLD_SOLUTIONS: usize = 5;
 /// Graph searches.
 const SEARCHES: &[Method] =
     &[Method::HA, Method::HA_RS, Method::HA_HOLD, Method::MHHA, Method::SHA];
+/// The paper's policies.
+const TRAINED: &[Method] = &[Method::RL_SIMPLE, Method::RL_EVAL];
 /// The paper's N3P.
 const PAPER: &[Method] = &[Method::MLP_N3P, Method::KNN_N3P];
+/// Policies from elsewhere.
+const OUTSIDE: &[Method] = &[Method::POLICY];
 /// Our own.
 const OURS: &[Method] = &[Method::N3P];
 
@@ -103,6 +107,17 @@ impl Method {
         paper_name: Some("SHA*"),
         make: Make::Search(|config| Box::new(ScenarioHybridAStar::new(*config))),
     });
+    /// A policy that learnt in abstracted environments.
+    pub const RL_SIMPLE: Self = Self(&Entry {
+        name: "rl-simple",
+        paper_name: Some("RL Simple"),
+        make: Make::Trained("simple"),
+    });
+    /// A policy that learnt in generated scenes.
+    pub const RL_EVAL: Self =
+        Self(&Entry { name: "rl-eval", paper_name: Some("RL Eval"), make: Make::Trained("eval") });
+    /// A policy from outside.
+    pub const POLICY: Self = Self(&Entry { name: "policy", paper_name: None, make: Make::Outside });
     /// The paper's N3P with a pose from the MLP.
     pub const MLP_N3P: Self = Self(&Entry {
         name: "mlp-n3p",
@@ -122,14 +137,9 @@ impl Method {
         make: Make::Guided(Learnt::Either, |n, s, c| GuidedPlanner::ranked(n, s, c.planner, c.n3p)),
     });
 
-    /// The method of an entry.
-    pub const fn new(entry: &'static Entry) -> Self {
-        Self(entry)
-    }
-
     /// All methods, in the order of the paper's tables, ours last.
     pub fn all() -> impl Iterator<Item = Method> {
-        [SEARCHES, more::TRAINED, PAPER, more::OUTSIDE, OURS].into_iter().flatten().copied()
+        [SEARCHES, TRAINED, PAPER, OUTSIDE, OURS].into_iter().flatten().copied()
     }
 
     /// The name used in rows, files and on the command line.
@@ -347,7 +357,6 @@ mod tests {
         };
         let message = build("n3p");
         assert!(message.contains("--model") && message.contains("n3p-train knn"), "{message}");
-        #[cfg(feature = "lab")]
         for (method, part) in
             [("rl-eval", "n3p-train rl --env eval"), ("policy", "--policy FILE.onnx")]
         {

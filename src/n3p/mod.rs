@@ -9,7 +9,7 @@ mod driver;
 pub mod guided;
 pub mod method;
 mod models;
-mod more;
+pub(crate) mod more;
 
 pub use catalogue::{Listing, catalogue};
 pub use driver::{Choice, Driver, RolloutConfig, TrainedPolicy};

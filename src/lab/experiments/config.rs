@@ -8,7 +8,6 @@ use crate::lab::dataset::{CollectConfig, Subset};
 use crate::lab::evaluation::SuiteConfig;
 use crate::lab::evaluation::suite::MAX_COUNT;
 use crate::lab::rl::courses::Course;
-use crate::lab::rl::methods::POLICY;
 use crate::lab::toml_file::{TomlError, read_toml};
 use crate::lab::training::MlpConfig;
 use crate::lab::training::rl::RlConfig;
@@ -234,7 +233,7 @@ impl ExperimentConfig {
             self.train.rl.validate().map_err(|e| format!("train.rl: {e}"))?;
         }
         let e = &self.evaluate;
-        if e.methods.contains(&POLICY) {
+        if e.methods.contains(&Method::POLICY) {
             return Err("evaluate.methods names policy, which only n3p-eval and n3p-plan know; \
                         leave it out"
                 .to_owned());

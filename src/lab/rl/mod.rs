@@ -13,10 +13,10 @@
 pub mod actor;
 pub mod courses;
 #[cfg(feature = "lab")]
+pub(crate) mod drivers;
+#[cfg(feature = "lab")]
 pub mod encoding;
 pub mod lidar;
-#[cfg(feature = "lab")]
-pub mod methods;
 pub mod motion;
 #[cfg(feature = "lab")]
 pub mod network;

@@ -1,44 +1,27 @@
-//! The methods that drive step by step, and their policies as the planner's layer knows them.
+//! Policies as the planner's layer knows them: what makes a method's planner around itself.
 
 use std::path::Path;
 use std::sync::Arc;
 
 use super::actor::{Actor, ActorPolicy};
-use super::courses::Course;
 use super::policy_file;
 use super::rollout::PolicyPlanner;
 use super::source::PolicySource;
-use crate::n3p::method::{Entry, Make};
-use crate::n3p::{Driver, Method, MethodSettings, TrainedPolicy};
+use crate::n3p::{Driver, MethodSettings, TrainedPolicy};
 use crate::planners::Planner;
 use crate::selectors::artefact::ArtefactError;
-
-/// A policy that learnt in abstracted environments.
-pub const RL_SIMPLE: Method = Method::new(&Entry {
-    name: "rl-simple",
-    paper_name: Some("RL Simple"),
-    make: Make::Trained(Course::Simple.name()),
-});
-/// A policy that learnt in generated scenes.
-pub const RL_EVAL: Method = Method::new(&Entry {
-    name: "rl-eval",
-    paper_name: Some("RL Eval"),
-    make: Make::Trained(Course::Eval.name()),
-});
-/// A policy from outside.
-pub const POLICY: Method =
-    Method::new(&Entry { name: "policy", paper_name: None, make: Make::Outside });
-
-/// The paper's policies.
-pub(crate) const TRAINED: &[Method] = &[RL_SIMPLE, RL_EVAL];
-/// Policies from elsewhere.
-pub(crate) const OUTSIDE: &[Method] = &[POLICY];
 
 /// Reads a policy that was trained here.
 pub(crate) fn read_policy(path: &Path) -> Result<TrainedPolicy, ArtefactError> {
     let (header, actor) = policy_file::load(path)?;
     let (course, vehicle) = (header.course.name(), header.vehicle);
     Ok(TrainedPolicy { course, vehicle, driver: Arc::new(actor) })
+}
+
+/// Opens a policy from outside, once to see that it can be ([`PolicySource::new`]).
+pub(crate) fn open_policy(spec: &str, limit_s: f64) -> Result<Arc<dyn Driver>, String> {
+    let source = PolicySource::new(spec, limit_s).map_err(|e| e.to_string())?;
+    Ok(Arc::new(source))
 }
 
 impl Driver for Actor {
