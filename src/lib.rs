@@ -38,6 +38,7 @@
 //! - [`mod@n3p`]: N3P itself, every method by name, and the models that serve a vehicle
 //! - [`output`]: path and trajectory files, pictures
 //! - [`episode`]: one method on one scene, timed and checked
+//! - `environment` (feature of that name): what policies see, do and learn in
 //! - `lab` (feature of that name): what learns and compares: policies, data, training, evaluation, experiments
 //! - `cli` (feature `plan`): arguments, output and exit codes of the binaries
 
@@ -46,10 +47,12 @@
 #[cfg(feature = "plan")]
 pub mod cli;
 pub mod curves;
+#[cfg(feature = "environment")]
+pub mod environment;
 pub mod episode;
 pub mod files;
 pub mod geometry;
-#[cfg(feature = "environment")]
+#[cfg(feature = "lab")]
 pub mod lab;
 pub mod n3p;
 pub mod output;

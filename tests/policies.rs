@@ -8,9 +8,10 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use n3p::environment::{Action, BEAMS, MASK, Observation};
 use n3p::lab::rl::onnx::{OnnxError, OnnxPolicy};
 use n3p::lab::rl::process::ProcessPolicy;
-use n3p::lab::rl::{Action, BEAMS, MASK, Observation, Policy, PolicyFault};
+use n3p::lab::rl::{Policy, PolicyFault};
 use n3p::rng::{Stream, rng};
 use n3p::vehicle::Vehicle;
 use rand::Rng;

@@ -2,11 +2,11 @@
 
 #![cfg(feature = "lab")]
 
+use n3p::environment::courses::{Course, Stratum};
+use n3p::environment::motion::{self, ActionMask, PARTS, admitted, drive};
+use n3p::environment::parking_env::{End, EnvConfig, ParkingEnv};
+use n3p::environment::{Action, MASK, Observation};
 use n3p::geometry::{Pose, Vec2};
-use n3p::lab::rl::courses::{Course, Stratum};
-use n3p::lab::rl::motion::{self, ActionMask, PARTS, admitted, drive};
-use n3p::lab::rl::parking_env::{End, EnvConfig, ParkingEnv};
-use n3p::lab::rl::{Action, MASK, Observation};
 use n3p::planners::Problem;
 use n3p::rng::{Stream, rng};
 use n3p::vehicle::Vehicle;

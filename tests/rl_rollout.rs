@@ -2,13 +2,14 @@
 
 #![cfg(feature = "lab")]
 
+use n3p::environment::courses::{Course, Stratum};
+use n3p::environment::motion::{action, admitted};
+use n3p::environment::{Action, MASK, Observation};
 use n3p::episode;
 use n3p::episode::{Case, EpisodeConfig};
 use n3p::lab::evaluation::oracle;
-use n3p::lab::rl::courses::{Course, Stratum};
-use n3p::lab::rl::motion::{action, admitted};
 use n3p::lab::rl::rollout::PolicyPlanner;
-use n3p::lab::rl::{Action, MASK, Observation, Policy, PolicyFault};
+use n3p::lab::rl::{Policy, PolicyFault};
 use n3p::n3p::RolloutConfig;
 use n3p::output::PathFile;
 use n3p::planners::{Budget, HybridAStarConfig, NoPath, PARKED_COVER, Planner, Problem};

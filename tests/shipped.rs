@@ -4,9 +4,9 @@
 
 use std::path::Path;
 
+use n3p::environment::courses::Course;
 use n3p::lab::dataset::{CollectConfig, Dataset};
 use n3p::lab::experiments::ExperimentConfig;
-use n3p::lab::rl::courses::Course;
 use n3p::lab::rl::policy_file;
 use n3p::lab::training::MlpConfig;
 use n3p::lab::training::rl::{RlConfig, RlLog};

@@ -7,9 +7,9 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 
-use n3p::lab::rl::courses::{Course, Stratum};
-use n3p::lab::rl::parking_env::{End, EnvConfig, ParkingEnv};
-use n3p::lab::rl::{Action, BEAMS, MASK, Observation, TARGET};
+use n3p::environment::courses::{Course, Stratum};
+use n3p::environment::parking_env::{End, EnvConfig, ParkingEnv};
+use n3p::environment::{Action, BEAMS, MASK, Observation, TARGET};
 use n3p::planners::Problem;
 use n3p::world::{Level, ParkingType, Scene};
 

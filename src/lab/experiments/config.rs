@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::environment::courses::Course;
 use crate::lab::dataset::{CollectConfig, Subset};
 use crate::lab::evaluation::SuiteConfig;
 use crate::lab::evaluation::suite::MAX_COUNT;
-use crate::lab::rl::courses::Course;
 use crate::lab::toml_file::{TomlError, read_toml};
 use crate::lab::training::MlpConfig;
 use crate::lab::training::rl::RlConfig;

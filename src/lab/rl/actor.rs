@@ -7,10 +7,11 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 use super::encoding::InputScale;
-use super::motion::admitted;
 use super::network::{ACTION, Network, Parameters};
 use super::sac::squashed;
-use super::{Action, Observation, Policy, PolicyFault, TARGET};
+use super::{Policy, PolicyFault};
+use crate::environment::motion::admitted;
+use crate::environment::{Action, Observation, TARGET};
 
 /// The actor's network and the scaling of its inputs.
 #[derive(Clone, Debug)]

@@ -3,7 +3,7 @@
 use candle_core::{Device, Result, Tensor};
 use serde::{Deserialize, Serialize};
 
-use super::{BEAMS, MASK, Observation, TARGET};
+use crate::environment::{BEAMS, MASK, Observation, TARGET};
 
 /// Lidar and target, the inputs that are scaled. The mask is a share already.
 const SCALED: usize = BEAMS + TARGET;

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use candle_core::{Device, Result, Tensor, Var};
 use rand::RngExt;
 
-use super::{BEAMS, MASK, TARGET};
+use crate::environment::{BEAMS, MASK, TARGET};
 use crate::lab::nn::{attention, layer_norm};
 use crate::rng::{Stream, rng};
 

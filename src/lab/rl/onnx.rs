@@ -29,7 +29,8 @@ use rten_tensor::Layout;
 
 pub use super::onnx_file::{OnnxError, OnnxFault};
 use super::onnx_file::{in_one_line, read};
-use super::{Action, BEAMS, MASK, Observation, Policy, PolicyFault};
+use super::{Policy, PolicyFault};
+use crate::environment::{Action, BEAMS, MASK, Observation};
 
 /// Name of the output.
 const ACTION: &str = "action";

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use rten::{LoadErrorKind, Model};
 
-use super::{BEAMS, MASK, TARGET};
+use crate::environment::{BEAMS, MASK, TARGET};
 use crate::files::reason;
 
 /// An ONNX file that cannot be used.

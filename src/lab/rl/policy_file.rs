@@ -10,9 +10,9 @@ use candle_core::Device;
 use serde::{Deserialize, Serialize};
 
 use super::actor::Actor;
-use super::courses::Course;
 use super::encoding::InputScale;
 use super::network::{Parameters, Role};
+use crate::environment::courses::Course;
 use crate::selectors::artefact::{self, ArtefactError, Fault};
 use crate::selectors::tensor_file::{self, Content, NamedTensor};
 use crate::vehicle::Vehicle;

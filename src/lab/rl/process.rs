@@ -22,7 +22,8 @@ use std::time::Duration;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use super::{Action, Observation, Policy, PolicyFault};
+use super::{Policy, PolicyFault};
+use crate::environment::{Action, Observation};
 use crate::files::reason;
 
 /// Bytes of the longest line that is read whole; an answer has about fifty.

@@ -1,8 +1,8 @@
 //! The replay memory: a ring of transitions, packed.
 
-use super::lidar::RANGE;
-use super::motion::PARTS;
-use super::{Action, BEAMS, MASK, Observation, TARGET};
+use crate::environment::lidar::RANGE;
+use crate::environment::motion::PARTS;
+use crate::environment::{Action, BEAMS, MASK, Observation, TARGET};
 
 /// What one step taught.
 #[derive(Clone, Copy, Debug, PartialEq)]

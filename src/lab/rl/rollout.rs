@@ -2,10 +2,10 @@
 
 use rand_chacha::ChaCha8Rng;
 
-use super::motion::drive;
-use super::senses::Senses;
 use super::{Policy, PolicyFault};
 use crate::curves::Path;
+use crate::environment::motion::drive;
+use crate::environment::senses::Senses;
 use crate::n3p::RolloutConfig;
 use crate::planners::{
     Budget, HybridAStarConfig, NoPath, PARKED_COVER, PlanResult, Planner, Problem,

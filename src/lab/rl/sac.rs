@@ -8,10 +8,10 @@
 use candle_core::{D, Device, Result, Tensor, Var};
 use serde::{Deserialize, Serialize};
 
-use super::Observation;
 use super::encoding::InputScale;
 use super::network::{ACTION, Network, Parameters, Role};
 use super::replay::Transition;
+use crate::environment::Observation;
 use crate::lab::nn::AdamW;
 
 /// Settings of the algorithm.

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use super::log::RlLog;
-use crate::lab::rl::courses::{Course, Stratum};
+use crate::environment::courses::{Course, Stratum};
 use crate::lab::training::card::{VERSION, name, percent};
 use crate::world::ParkingType;
 

@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 
 use super::log::RlLog;
 use super::strata::Strata;
-use crate::lab::rl::courses::Stratum;
+use crate::environment::courses::Stratum;
+use crate::environment::parking_env::Progress;
 use crate::lab::rl::encoding::InputScale;
 use crate::lab::rl::network::{Parameters, Role};
-use crate::lab::rl::parking_env::Progress;
 use crate::lab::rl::replay::Replay;
 use crate::lab::rl::sac::{Parts, Sac};
 use crate::selectors::artefact::{self, ArtefactError, Fault};

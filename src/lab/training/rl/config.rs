@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::lab::rl::parking_env::EnvConfig;
+use crate::environment::parking_env::EnvConfig;
 use crate::lab::rl::sac::SacConfig;
 use crate::lab::training::TrainingError;
 use crate::lab::training::settings::{self, check, real, whole};

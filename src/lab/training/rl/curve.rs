@@ -3,7 +3,7 @@
 use plotters::prelude::*;
 
 use super::log::{Point, RlLog};
-use crate::lab::rl::courses::Stratum;
+use crate::environment::courses::Stratum;
 use crate::lab::training::TrainingError;
 
 /// An SVG: share parked in training and in validation over the episodes.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::RlConfig;
-use crate::lab::rl::courses::{Course, Stratum};
+use crate::environment::courses::{Course, Stratum};
 use crate::lab::rl::sac::Losses;
 use crate::world::ParkingType;
 

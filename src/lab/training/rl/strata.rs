@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
-use crate::lab::rl::courses::Stratum;
+use crate::environment::courses::Stratum;
 use crate::rng::{Stream, rng};
 use crate::world::Level;
 
