@@ -25,7 +25,8 @@
 //! shows the three together on one page. Metres, radians, counter-clockwise; a pose is that of
 //! the rear-axle centre.
 //!
-//! The modules in reading order; each uses those above it, never one below.
+//! The modules in reading order; each uses those above it, never one below (but for one file, through
+//! which the laboratory's policies come to the methods of [`mod@n3p`]).
 //!
 //! - `rng` (feature `generate`): one seed, many named random streams
 //! - [`files`]: files that are whole or absent, and plain words for what fails

@@ -73,6 +73,9 @@ pub enum PlanError {
     /// What was asked is no problem: a number that is none, a start or a goal that is not free.
     #[error("{0}")]
     Problem(ProblemError),
+    /// A request has no goal.
+    #[error("the request has no goal; give at least one pose")]
+    NoGoal,
     /// A scene has another vehicle than the parker.
     #[error("the scene's vehicle is not the one that this parker was made for; make one for it")]
     OtherVehicle,
@@ -147,6 +150,9 @@ impl Parker {
 
     /// The path for a request, which may have several goals, a tolerance and a hint.
     pub fn plan_request(&self, request: &Request, lot: &Lot) -> Result<Plan, PlanError> {
+        if request.goals.is_empty() {
+            return Err(PlanError::NoGoal);
+        }
         self.plan_scene(&lot.scene(self.vehicle, request))
     }
 

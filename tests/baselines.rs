@@ -136,5 +136,5 @@ fn effort_only_ever_pays() {
         }
     }
     assert_eq!("most".parse(), Ok(Effort::Most));
-    assert!("utmost".parse::<Effort>().unwrap_err().contains("first, usual, most"));
+    assert!("utmost".parse::<Effort>().unwrap_err().to_string().contains("first, usual, most"));
 }

@@ -15,7 +15,7 @@ use n3p::planners::{
 use n3p::vehicle::Vehicle;
 use n3p::world::collision::CollisionWorld;
 use n3p::world::generate::{GeneratorConfig, generate};
-use n3p::world::{Level, ParkingType, Scene};
+use n3p::world::{GoalTolerance, Level, ParkingType, Scene};
 use predicates::prelude::*;
 use predicates::str::contains;
 use proptest::prelude::{ProptestConfig, any, prop_assert, prop_assert_eq, prop_assume, proptest};
@@ -275,4 +275,29 @@ fn an_evaluation_allows_it_too() {
     let json: serde_json::Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
     let rows = json["rows"].as_array().unwrap();
     assert!(rows.len() == 3 && rows.iter().all(|row| row["ok"] == true), "{rows:?}");
+}
+
+/// A tolerance only adds ways to arrive: a plan that touches at the goal is not given up for a goal
+/// beside it to which none was found.
+#[test]
+fn a_path_into_contact_is_better_than_none_beside_it() {
+    let little = Budget::new(60);
+    let (mut found, mut plans) = (0, 0);
+    for index in 0..24 {
+        let mut exact = scene(index);
+        let side = index as usize % 4;
+        exact.obstacles.push(box_at(&exact.vehicle, exact.goal, side, 0.3, 0.02));
+        let tolerance = GoalTolerance { position_m: 0.1, heading_rad: 0.0 };
+        let wide = Scene { goal_tolerance: Some(tolerance), ..exact.clone() };
+        let solved = |scene: &Scene| {
+            let planned = goals::plan(&mut ha_rs(), scene, TERMS, little);
+            planned.is_ok_and(|p| p.result.outcome.is_ok())
+        };
+        plans += 1;
+        if solved(&exact) {
+            found += 1;
+            assert!(solved(&wide), "{index}");
+        }
+    }
+    assert!(found > 0 && found < plans, "{found} of {plans} within a small budget");
 }

@@ -161,6 +161,7 @@ fn who_stands_within_the_tolerance_stays() {
     let scene = Scene { start, ..scene };
     let planned = plan(&scene).unwrap();
     assert!(planned.result.outcome.as_ref().unwrap().segments.is_empty(), "{planned:?}");
+    assert_eq!(planned.result.expansions, 0, "nothing is searched for");
     let beyond = GoalTolerance { heading_rad: 0.01, ..tolerance };
     let planned = plan(&Scene { goal_tolerance: Some(beyond), ..scene }).unwrap();
     assert!(cost(&planned) > 0.0);

@@ -147,8 +147,8 @@ fn ninety_per_cent_of_the_spot_is_parked() {
     let path = result.outcome.expect("it backs into the spot");
     assert!(result.covered.unwrap() >= PARKED_COVER && result.covered.unwrap() < 1.0);
     let file = PathFile::new(&scene, &problem.frame, &path, "policy");
-    assert!(oracle::check_cover(&scene, &file, PARKED_COVER).is_ok());
-    let error = oracle::check_cover(&scene, &file, 0.999).unwrap_err().to_string();
+    assert!(oracle::measure(&scene, &file, Some(PARKED_COVER), 0.0).is_ok());
+    let error = oracle::measure(&scene, &file, Some(0.999), 0.0).unwrap_err().to_string();
     assert!(error.contains("of the parked footprint is covered, expected 0.999"), "{error}");
     assert!(oracle::check(&scene, &file).is_err());
 }

@@ -174,3 +174,47 @@ fn the_mouth_of_a_deep_bay_is_where_the_lane_begins() {
         }
     }
 }
+
+/// A scanner sees the same spots: the outlines as points 5 cm apart.
+#[test]
+fn scanned_points_are_read_as_what_they_are_points_of() {
+    let scanned = |scene: &Scene| {
+        let mut points = Vec::new();
+        for outline in &scene.obstacles {
+            for (a, b) in outline.iter().zip(outline.iter().cycle().skip(1)) {
+                let steps = ((b[0] - a[0]).hypot(b[1] - a[1]) / 0.05).ceil() as u32;
+                let at = |i: u32, k: usize| a[k] + (b[k] - a[k]) * f64::from(i) / f64::from(steps);
+                points.extend((0..steps).map(|i| [at(i, 0), at(i, 1)]));
+            }
+        }
+        Scene { obstacles: Vec::new(), points, ..scene.clone() }
+    };
+    let (mut same, mut all) = (0, 0);
+    for unusual in Unusual::ALL {
+        for &expected in unusual.kinds() {
+            for index in 0..COUNT {
+                let scene = bay(unusual, expected, SEED, index);
+                all += 1;
+                same += u32::from(kind(&scene) == kind(&scanned(&scene)));
+            }
+        }
+    }
+    assert!(same * 100 >= all * 97, "{same} of {all}");
+    // A garage: a bay, and walls across the lane to either side.
+    let wall = |x: f64| vec![[x, -3.0], [x + 0.3, -3.0], [x + 0.3, 9.5], [x, 9.5]];
+    let car = |x: f64| vec![[x, -2.6], [x + 2.5, -2.6], [x + 2.5, 2.4], [x, 2.4]];
+    let garage = Scene {
+        start: Pose::new(-7.0, 6.0, 0.0),
+        goal: Pose::new(0.0, -1.5, std::f64::consts::FRAC_PI_2),
+        obstacles: vec![
+            car(-4.1),
+            car(1.6),
+            wall(-12.0),
+            wall(12.0),
+            vec![[-12.0, 9.5], [12.0, 9.5]],
+        ],
+        ..bay(Unusual::ALL[0], Unusual::ALL[0].kinds()[0], SEED, 0)
+    };
+    assert_eq!(kind(&garage), Some(ParkingType::Reverse));
+    assert_eq!(kind(&scanned(&garage)), Some(ParkingType::Reverse));
+}

@@ -49,7 +49,9 @@ impl From<ParkerError> for Failure {
 impl From<PlanError> for Failure {
     fn from(error: PlanError) -> Self {
         let status = match error {
-            PlanError::Problem(_) | PlanError::OtherVehicle => n3p_status::N3P_BAD_INPUT,
+            PlanError::Problem(_) | PlanError::NoGoal | PlanError::OtherVehicle => {
+                n3p_status::N3P_BAD_INPUT
+            }
             PlanError::NoPath(_) => n3p_status::N3P_NO_PATH,
         };
         Self { status, message: error.to_string() }

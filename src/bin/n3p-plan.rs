@@ -149,14 +149,6 @@ fn plan(args: &Args) -> Result<ExitCode> {
     for path in args.out.iter().chain(&args.svg).chain(&args.trajectory) {
         check_writable(path).map_err(|e| unwritable(path, e))?;
     }
-    if problem.margin < args.margin && problem.contact.is_none() {
-        tracing::warn!(
-            "start or goal is nearer to an obstacle than --margin {}: the path may come as near as \
-             {} m to that obstacle",
-            args.margin,
-            problem.margin
-        );
-    }
     let (method, models) = choose(args, &scene, &problem)?;
     let mut planner = method.build(&models, &MethodSettings::default()).or_bad_input()?;
     let case = Case { kind: problem.kind, level: None, scene };
@@ -171,6 +163,15 @@ fn plan(args: &Args) -> Result<ExitCode> {
     };
     let episode = episode::run(&case, planner.as_mut(), &once, &JUDGE)?;
     tell(&case.scene, &episode);
+    let kept = &episode.problem;
+    if kept.margin < args.margin && kept.contact.is_none() {
+        tracing::warn!(
+            "start or goal is nearer to an obstacle than --margin {}: the path may come as near as \
+             {} m to that obstacle",
+            args.margin,
+            kept.margin
+        );
+    }
     // From here on the scene has the goal that was chosen.
     let whole = case.scene;
     let scene = whole.with_goal(whole.all_goals()[episode.goal_index]);

@@ -66,7 +66,8 @@ impl Path {
 
     /// Driven length, metres.
     pub fn length(&self) -> f64 {
-        self.segments.iter().map(|s| s.length.abs()).sum()
+        // Not `sum`, whose nothing is −0.
+        self.segments.iter().fold(0.0, |sum, s| sum + s.length.abs())
     }
 
     /// How often the gear changes along the way.

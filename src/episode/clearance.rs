@@ -1,6 +1,6 @@
 //! How near a path comes to the obstacles of its scene.
 
-use crate::geometry::{Aabb, Pose, Vec2};
+use crate::geometry::{Aabb, Pose, Vec2, distance_to_segment, segment_in_box};
 use crate::output::PathFile;
 use crate::world::Scene;
 
@@ -54,36 +54,13 @@ fn distance(body: &Aabb, [a, b]: [Vec2; 2]) -> f64 {
             Vec2::new(p.x.clamp(body.min.x, body.max.x), p.y.clamp(body.min.y, body.max.y));
         (p - nearest).norm()
     };
-    if meets(body, a, b - a) {
+    if segment_in_box(a, b, body) {
         return 0.0;
     }
     let corners =
         [body.min, Vec2::new(body.max.x, body.min.y), body.max, Vec2::new(body.min.x, body.max.y)];
-    let along = |c: Vec2| {
-        let (d, to) = (b - a, c - a);
-        let t = (to.dot(&d) / d.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        (to - d * t).norm()
-    };
+    let along = |c: Vec2| distance_to_segment(c, a, b);
     corners.into_iter().map(along).fold(outside(a).min(outside(b)), f64::min)
-}
-
-/// Whether the segment from `a` by `d` has a point in the box.
-fn meets(body: &Aabb, a: Vec2, d: Vec2) -> bool {
-    let (mut from, mut to) = (0.0_f64, 1.0_f64);
-    for (low, high, a, d) in
-        [(body.min.x, body.max.x, a.x, d.x), (body.min.y, body.max.y, a.y, d.y)]
-    {
-        if d == 0.0 {
-            if a < low || a > high {
-                return false;
-            }
-            continue;
-        }
-        let (enter, leave) = ((low - a) / d, (high - a) / d);
-        from = from.max(enter.min(leave));
-        to = to.min(enter.max(leave));
-    }
-    from <= to
 }
 
 #[cfg(test)]

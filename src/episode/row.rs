@@ -38,9 +38,11 @@ pub struct Row {
     pub min_clearance_m: Option<f64>,
     /// Whether a guided planner had to search the whole way after all.
     pub fallback: bool,
-    /// Verdict of the independent check: `ok`, the violation, or empty without a path.
+    /// Verdict of the independent check: `ok`, the violation, or empty without a path; `certified`
+    /// where nobody but the planner has looked.
     pub checked: String,
-    /// How a guided planner came to its path: `library`, `direct`, `searched`, `fallback`.
+    /// How a guided planner came to its path: `library`, `direct`, `searched`, `fallback`, `no-lane`,
+    /// `no-spot`.
     pub route: String,
     /// Cost of the path over that of the cheapest in the scene: [`fill`](super::fill) writes this and
     /// the next once a run is complete.

@@ -391,7 +391,8 @@ impl Planner for GuidedPlanner {
                 None => self.fall_back(problem, &mut left),
             },
             Strategy::Ranked(config) => {
-                let planned = self.plan_ranked(problem, config, budget.effort, &mut left);
+                let at_first = budget.effort.min(Effort::Usual);
+                let planned = self.plan_ranked(problem, config, at_first, &mut left);
                 match budget.effort {
                     Effort::First | Effort::Usual => planned,
                     Effort::Most => planned.map(|p| self.look_again(problem, p, &mut left)),

@@ -5,6 +5,8 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
+use crate::world::UnknownName;
+
 /// How much work a planner may spend. Counts work, never time, so that results are
 /// the same on every machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +32,7 @@ impl Default for Budget {
 }
 
 /// How long a planner goes on once it has a path. Who drives step by step, a policy, never does.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Effort {
     /// The first path is the answer, as it was found.
@@ -84,12 +86,13 @@ impl fmt::Display for Effort {
 }
 
 impl FromStr for Effort {
-    type Err = String;
+    type Err = UnknownName;
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        let known = Self::ALL.into_iter().find(|e| e.name() == text);
-        known.ok_or_else(|| {
-            format!("unknown effort; expected {}", Self::ALL.map(Self::name).join(", "))
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
+        Self::ALL.into_iter().find(|e| e.name() == text).ok_or_else(|| UnknownName {
+            what: "effort",
+            name: text.to_owned(),
+            expected: Self::ALL.map(Self::name).join(", "),
         })
     }
 }

@@ -7,7 +7,7 @@
 //! an ordinary problem from where it ends.
 
 use super::cost::CostModel;
-use super::problem::Keeping;
+use super::problem::Terms;
 use super::{Budget, PlanResult, Planner, Problem};
 use crate::curves::{Path, Segment, reeds_shepp};
 use crate::geometry::{Pose, Vec2};
@@ -140,9 +140,12 @@ impl Contact {
     /// The ordinary problem from `start` to `goal`, which touch nothing.
     fn between(&self, problem: &Problem, start: Pose, goal: Pose) -> Option<Problem> {
         let Problem { vehicle, frame, kind, ref obstacles, .. } = *problem;
-        let keeping = Keeping { margin: self.margin, contact: 0.0 };
+        let terms = Terms { margin: self.margin, contact: 0.0 };
         let (ends, obstacles) = ([start, goal], obstacles.clone());
-        Problem::checked(vehicle, frame, kind, ends, obstacles, self.bounds, keeping).ok()
+        let part = Problem::checked(vehicle, frame, kind, ends, obstacles, self.bounds, terms);
+        // The lane begins where it did; the goal may lie farther out.
+        let mouth = (problem.mouth - (goal.y - problem.goal.y)).max(0.0);
+        part.ok().map(|part| Problem { mouth, ..part })
     }
 }
 
@@ -222,12 +225,12 @@ pub(super) fn plan(planner: &mut dyn Planner, problem: &Problem, budget: Budget)
     let radius = 1.0 / vehicle.max_curvature();
     let per_metre = model.forward.min(model.backward);
     let mut ways = Vec::new();
+    let ways_in: Vec<Path> = contact.ways_out(problem, problem.goal).iter().map(backward).collect();
     for out in contact.ways_out(problem, problem.start) {
-        for back in contact.ways_out(problem, problem.goal) {
-            let into = backward(&back);
+        for into in &ways_in {
             let rest = reeds_shepp::shortest_length(out.end(), into.start, radius);
             let bound = cost(&out.segments) + per_metre * (rest + into.length());
-            ways.push((bound, out.clone(), into));
+            ways.push((bound, out.clone(), into.clone()));
         }
     }
     ways.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -7,39 +7,11 @@
 
 use super::contact;
 use super::cost::CostModel;
+pub use super::problem::Terms;
 use super::{Budget, NoPath, PlanResult, Planner, Problem, ProblemError};
 use crate::curves::{Path, Segment, reeds_shepp};
 use crate::geometry::Pose;
 use crate::world::Scene;
-
-/// What plans keep to besides reaching a goal.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Terms {
-    /// Clearance where start and goal allow it, metres: see [`Problem::with_margin`].
-    pub margin: f64,
-    /// How deep start and goal may reach into obstacles, metres: see [`Problem::allowing_contact`].
-    pub contact: f64,
-}
-
-impl Terms {
-    /// Checks both numbers.
-    pub fn check(self) -> Result<(), ProblemError> {
-        if !(0.0..=Problem::MAX_MARGIN).contains(&self.margin) {
-            return Err(ProblemError::Margin(self.margin));
-        }
-        if !(0.0..=Problem::MAX_CONTACT).contains(&self.contact) {
-            return Err(ProblemError::Contact(self.contact));
-        }
-        Ok(())
-    }
-}
-
-impl Default for Terms {
-    /// The usual margin and no contact.
-    fn default() -> Self {
-        Self { margin: Problem::MARGIN, contact: 0.0 }
-    }
-}
 
 /// A plan to one of a scene's goals, or why there is none to any.
 #[derive(Clone, Debug)]
@@ -127,19 +99,22 @@ impl<'a> Goal<'a> {
     /// The poses within its tolerance that are tried besides the goal itself, in a fixed order.
     fn poses_beside(&self) -> Vec<Pose> {
         let Some(tolerance) = self.scene.goal_tolerance else { return Vec::new() };
-        let mut poses = tolerance.poses(self.pose).split_off(1);
-        // Who stands within the tolerance may stay there.
-        if tolerance.holds(self.pose, self.scene.start, 0.0) {
-            poses.insert(0, self.scene.start);
-        }
-        poses
+        tolerance.poses(self.pose).split_off(1)
+    }
+
+    /// Staying where the car is, where that is within the tolerance.
+    fn stay(&self) -> Option<(Problem, PlanResult)> {
+        let (tolerance, start) = (self.scene.goal_tolerance?, self.scene.start);
+        let problem =
+            if tolerance.holds(self.pose, start, 0.0) { self.to(start)? } else { return None };
+        let stays = PlanResult::certified(&problem, Path::new(problem.start, []), 0);
+        stays.outcome.is_ok().then_some((problem, stays))
     }
 
     /// The problem of one of [`Goal::poses_beside`]; `None` where the car does not fit.
     fn to(&self, pose: Pose) -> Option<Problem> {
         let scene = self.scene.with_goal(pose);
-        let mut problem =
-            Problem::unexplained(&scene, self.terms.margin, self.terms.contact).ok()?;
+        let mut problem = Problem::unexplained(&scene, self.terms).ok()?;
         let centre = problem.frame.local_from_world(self.pose);
         problem.tolerance = self.scene.goal_tolerance.map(|tolerance| (centre, tolerance));
         Some(problem)
@@ -188,6 +163,9 @@ impl<'a> Goal<'a> {
             let cost = path.map_or(f64::INFINITY, cost);
             Found { index: self.index, problem, result, cost }
         };
+        if let Some((problem, stays)) = self.stay() {
+            return Ok(Ok(found(problem, stays)));
+        }
         let exact = self.exact()?.map(|problem| {
             let result = contact::plan(planner, &problem, budget);
             found(problem, result)
@@ -201,14 +179,8 @@ impl<'a> Goal<'a> {
                 continue;
             }
             let Some(problem) = self.to(pose) else { continue };
-            // Who has arrived already stays.
-            let stays = PlanResult::certified(&problem, Path::new(problem.start, []), 0);
-            let result = match stays.outcome {
-                Ok(_) => stays,
-                Err(_) => {
-                    contact::plan(planner, &problem, Budget { max_expansions: left, ..budget })
-                }
-            };
+            let result =
+                contact::plan(planner, &problem, Budget { max_expansions: left, ..budget });
             expansions += result.expansions;
             left = left.saturating_sub(result.expansions);
             let other = found(problem, result);
@@ -230,15 +202,17 @@ struct Found {
 }
 
 impl Found {
-    /// What is compared: contact at the goal that can be avoided is, whatever it costs.
-    fn rank(&self) -> (bool, f64) {
-        (self.problem.contact.as_ref().is_some_and(|c| c.goal_depth > 0.0), self.cost)
+    /// What is compared: any path is better than none, and contact at the goal that can be avoided
+    /// is, whatever it costs.
+    fn rank(&self) -> (bool, bool, f64) {
+        let touches = self.problem.contact.as_ref().is_some_and(|c| c.goal_depth > 0.0);
+        (self.result.outcome.is_err(), touches, self.cost)
     }
 
     /// Whether nothing that costs `bound` or more can be better.
     fn beats(&self, bound: f64) -> bool {
-        let (touches, cost) = self.rank();
-        !touches && cost <= bound
+        let (failed, touches, cost) = self.rank();
+        !failed && !touches && cost <= bound
     }
 }
 

@@ -39,13 +39,33 @@ pub struct Problem {
     pub tolerance: Option<(Pose, GoalTolerance)>,
 }
 
-/// What is asked of a plan besides reaching its goal.
+/// What plans keep to besides reaching a goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Keeping {
-    /// Clearance from obstacles, metres.
+pub struct Terms {
+    /// Clearance where start and goal allow it, metres: see [`Problem::with_margin`].
     pub margin: f64,
-    /// How deep start and goal may reach into obstacles, metres.
+    /// How deep start and goal may reach into obstacles, metres: see [`Problem::allowing_contact`].
     pub contact: f64,
+}
+
+impl Terms {
+    /// Checks both numbers.
+    pub fn check(self) -> Result<(), ProblemError> {
+        if !(0.0..=Problem::MAX_MARGIN).contains(&self.margin) {
+            return Err(ProblemError::Margin(self.margin));
+        }
+        if !(0.0..=Problem::MAX_CONTACT).contains(&self.contact) {
+            return Err(ProblemError::Contact(self.contact));
+        }
+        Ok(())
+    }
+}
+
+impl Default for Terms {
+    /// The usual margin and no contact.
+    fn default() -> Self {
+        Self { margin: Problem::MARGIN, contact: 0.0 }
+    }
 }
 
 /// A problem that has no solution by its own data.
@@ -184,7 +204,7 @@ impl Problem {
     /// [`Problem::new`] without rounding anything ([`Precision`]): what policies are trained in,
     /// where nothing is to be the same anywhere on a map.
     pub fn as_given(scene: &Scene) -> Result<Problem, ProblemError> {
-        Self::seen(scene, Keeping { margin: Self::MARGIN, contact: 0.0 }, Precision::Given)
+        Self::seen(scene, Terms::default(), Precision::Given)
             .map_err(|error| error.explained(scene))
     }
 
@@ -208,30 +228,17 @@ impl Problem {
         margin: f64,
         contact: f64,
     ) -> Result<Problem, ProblemError> {
-        Self::unexplained(scene, margin, contact).map_err(|error| error.explained(scene))
+        Self::unexplained(scene, Terms { margin, contact }).map_err(|error| error.explained(scene))
     }
 
     /// [`Problem::allowing_contact`] whose errors do not say what start or goal touch: finding that
     /// out takes a while.
-    pub(super) fn unexplained(
-        scene: &Scene,
-        margin: f64,
-        contact: f64,
-    ) -> Result<Problem, ProblemError> {
-        if !(0.0..=Self::MAX_MARGIN).contains(&margin) {
-            return Err(ProblemError::Margin(margin));
-        }
-        if !(0.0..=Self::MAX_CONTACT).contains(&contact) {
-            return Err(ProblemError::Contact(contact));
-        }
-        Self::seen(scene, Keeping { margin, contact }, Precision::Rounded)
+    pub(super) fn unexplained(scene: &Scene, terms: Terms) -> Result<Problem, ProblemError> {
+        terms.check()?;
+        Self::seen(scene, terms, Precision::Rounded)
     }
 
-    fn seen(
-        scene: &Scene,
-        keeping: Keeping,
-        precision: Precision,
-    ) -> Result<Problem, ProblemError> {
+    fn seen(scene: &Scene, terms: Terms, precision: Precision) -> Result<Problem, ProblemError> {
         scene.check_numbers()?;
         let SpotGuess { frame, kind, obstacles, mouth } = spot::guess(scene, precision)?;
         let bounds = scene.bounds.map(|b| spot::bounds_in_frame(b, &frame, precision));
@@ -244,7 +251,7 @@ impl Problem {
             }),
         };
         let seen =
-            Self::checked(scene.vehicle, frame, kind, [start, goal], obstacles, bounds, keeping);
+            Self::checked(scene.vehicle, frame, kind, [start, goal], obstacles, bounds, terms);
         let mut problem = seen?;
         problem.mouth = mouth;
         problem.tolerance = scene.goal_tolerance.map(|tolerance| (goal, tolerance));
@@ -260,8 +267,8 @@ impl Problem {
     ) -> Result<Problem, ProblemError> {
         let goal = grid.goal(cell.kind, &vehicle);
         let (walls, ends) = (grid.walls(cell)?, [start, goal]);
-        let keeping = Keeping { margin: Self::MARGIN, contact: 0.0 };
-        Self::checked(vehicle, Frame::WORLD, Some(cell.kind), ends, walls, None, keeping)
+        let terms = Terms::default();
+        Self::checked(vehicle, Frame::WORLD, Some(cell.kind), ends, walls, None, terms)
     }
 
     pub(super) fn checked(
@@ -271,10 +278,10 @@ impl Problem {
         [start, goal]: [Pose; 2],
         obstacles: Obstacles,
         bounds: Option<[Vec2; 4]>,
-        keeping: Keeping,
+        terms: Terms,
     ) -> Result<Problem, ProblemError> {
         let least = Self::MARGIN * vehicle.scale();
-        let asked = keeping.margin;
+        let asked = terms.margin;
         let mut margin = if asked > Self::MARGIN { asked.max(least) } else { least };
         let mut collision = CollisionWorld::new(&obstacles, bounds, &vehicle, margin);
         let mut contact = None;
@@ -287,7 +294,7 @@ impl Problem {
             let (kept, mut close) = obstacles.partition(|one| ends_are_free(&alone(one, margin)));
             let far = CollisionWorld::new(&kept, bounds, &vehicle, margin);
             let mut touched = Obstacles::default();
-            if keeping.contact > 0.0 {
+            if terms.contact > 0.0 {
                 (close, touched) = close.partition(|one| ends_are_free(&alone(one, 0.0)));
             }
             for smaller in Self::margins_below(margin, least) {
@@ -301,7 +308,7 @@ impl Problem {
                 let found = Contact::new(&touched, &vehicle, [start, goal], bounds, asked);
                 let depth = found.start_depth.max(found.goal_depth);
                 // Where it is deeper than allowed the shrunken car still touches, and is refused.
-                let shrunk = -depth.min(keeping.contact);
+                let shrunk = -depth.min(terms.contact);
                 collision = collision.tolerating(&touched, &vehicle, shrunk);
                 (margin, contact) = (0.0, Some(found));
             }

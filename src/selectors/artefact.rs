@@ -1,6 +1,6 @@
 //! What every model file needs: finding, errors, checks, writing.
 //!
-//! Nothing is used before magic, version, checksum, shapes and vehicle are checked; every
+//! No file is used before magic, version, checksum, shapes and vehicle are checked; every
 //! [`ArtefactError`] names the file, what is wrong with it and what would mend it. Files are written
 //! aside, synced and renamed, so that a reader never sees half a model. Where there is no file of a
 //! bare name, one that is compiled in serves ([`shipped`]).

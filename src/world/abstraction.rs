@@ -87,21 +87,14 @@ impl Surroundings {
         self.polygons.last().map_or(0, |p| p.end)
     }
 
-    /// How far from `from` along the unit vector `along` the first obstacle is, at most `most`.
-    pub fn free_along(&self, from: Vec2, along: Vec2, most: f64) -> f64 {
+    /// How far from `from` along the unit vector `along` the first obstacle is within `width` of that
+    /// ray on either side, at most `most`. A ray without width would pass between scanned points.
+    pub fn free_along(&self, from: Vec2, along: Vec2, width: f64, most: f64) -> f64 {
         let across = Vec2::new(-along.y, along.x);
-        let mut free = most;
-        for (a, b) in &self.edges {
-            let ((xa, ya), (xb, yb)) =
-                [a, b].map(|p| ((p - from).dot(&along), (p - from).dot(&across))).into();
-            if (ya <= 0.0) != (yb <= 0.0) {
-                let x = xa + (xb - xa) * ya / (ya - yb);
-                if x >= 0.0 {
-                    free = free.min(x);
-                }
-            }
-        }
-        free
+        let seen = |p: Vec2| Vec2::new((p - from).dot(&along), (p - from).dot(&across));
+        let within = |&(a, b): &(Vec2, Vec2)| clip(seen(a), seen(b), 1, -width, width);
+        let ahead = self.edges.iter().filter_map(within).filter(|(a, b)| a.x.max(b.x) >= 0.0);
+        ahead.fold(most, |free, (a, b)| free.min(a.x.min(b.x).max(0.0)))
     }
 
     /// How far from x = 0 nothing stands between `low` and `high` in y, toward the side where that is

@@ -12,8 +12,9 @@ use std::f64::consts::PI;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use super::generate::{in_world, is_clear};
 use super::{ParkingType, Scene};
-use crate::geometry::{Aabb, Frame, Polygon, Pose, Vec2, segment_in_box};
+use crate::geometry::{Aabb, Frame, Polygon, Pose, Vec2};
 use crate::rng::{Stream, rng};
 use crate::vehicle::Vehicle;
 
@@ -126,14 +127,7 @@ impl Draw {
             ),
             mirrored: self.rng.random_bool(0.5),
         };
-        let in_world = |p: &Polygon| {
-            let mut vertices: Vec<[f64; 2]> =
-                p.vertices().iter().map(|&v| frame.world_from_local_point(v).into()).collect();
-            if frame.mirrored {
-                vertices.reverse();
-            }
-            vertices
-        };
+        let in_world = |p: &Polygon| in_world(p, &frame);
         Some(Scene {
             name: String::new(),
             source: String::new(),
@@ -278,12 +272,4 @@ fn outline(mut points: Vec<Vec2>) -> Polygon {
 /// The box between two corners, in any order of x.
 fn box_of(x0: f64, y0: f64, x1: f64, y1: f64) -> Polygon {
     Polygon::rectangle(Pose::default(), Aabb::new(x0.min(x1), y0, x0.max(x1), y1))
-}
-
-/// Whether the footprint at `pose`, grown by `margin`, shares no point with `polygon`.
-fn is_clear(vehicle: &Vehicle, pose: Pose, polygon: &Polygon, margin: f64) -> bool {
-    let footprint = vehicle.footprint(margin);
-    let local = |p| pose.point_to_local(p);
-    let touches = |(a, b)| segment_in_box(local(a), local(b), &footprint);
-    !polygon.edges().any(touches) && !polygon.contains(pose.position())
 }

@@ -478,7 +478,7 @@ fn far_edge(car: &Polygon, side: f64) -> f64 {
 }
 
 /// Whether the footprint at `pose`, grown by `margin`, shares no point with `polygon`.
-fn is_clear(vehicle: &Vehicle, pose: Pose, polygon: &Polygon, margin: f64) -> bool {
+pub(super) fn is_clear(vehicle: &Vehicle, pose: Pose, polygon: &Polygon, margin: f64) -> bool {
     let footprint = vehicle.footprint(margin);
     let local = |p| pose.point_to_local(p);
     let touches = |(a, b)| segment_in_box(local(a), local(b), &footprint);
@@ -486,7 +486,7 @@ fn is_clear(vehicle: &Vehicle, pose: Pose, polygon: &Polygon, margin: f64) -> bo
 }
 
 /// The vertices in the world, counter-clockwise there too.
-fn in_world(polygon: &Polygon, frame: &Frame) -> Vec<[f64; 2]> {
+pub(super) fn in_world(polygon: &Polygon, frame: &Frame) -> Vec<[f64; 2]> {
     let world = |&v: &Vec2| <[f64; 2]>::from(frame.world_from_local_point(v));
     let vertices = polygon.vertices().iter();
     if frame.mirrored { vertices.rev().map(world).collect() } else { vertices.map(world).collect() }

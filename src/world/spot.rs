@@ -220,6 +220,9 @@ fn is_along(seen: &Surroundings, lane: &Abstraction, grid: &Grid, scale: f64) ->
     const SLACK: f64 = 1.1;
     /// What stands so little into the lane on either side closes it for no one, of its width.
     const EDGE: f64 = 0.1;
+    /// Half the width of an oblique ray, metres for the default vehicle: more than scanned points are
+    /// apart.
+    const RAY: f64 = 0.15;
     let [area, _] = lane.regions(grid);
     let endless = ENDLESS * REACH * scale;
     // In nearly the whole width, as gaps between cars lead far, too.
@@ -231,7 +234,7 @@ fn is_along(seen: &Surroundings, lane: &Abstraction, grid: &Grid, scale: f64) ->
     let middle = Vec2::new(0.0, f64::midpoint(area.min.y, area.max.y));
     let free = |turn: f64, side: f64| {
         let (sin, cos) = turn.to_radians().sin_cos();
-        seen.free_along(middle, Vec2::new(cos * side, sin), endless)
+        seen.free_along(middle, Vec2::new(cos * side, sin), RAY * scale, endless)
     };
     // Both ways: what a gap lets see is seen on one side only.
     let across = |side| move |turn: &f64| free(*turn, side).min(free(-turn, -side));

@@ -163,13 +163,8 @@ pub fn check(scene: &Scene, path: &PathFile) -> Result<f64, Violation> {
     measure(scene, path, None, 0.0).map(|c| c.least)
 }
 
-/// [`check`] for a path that need not end at the goal, but where at least `share` of the parked
-/// footprint is covered.
-pub fn check_cover(scene: &Scene, path: &PathFile, share: f64) -> Result<f64, Violation> {
-    measure(scene, path, Some(share), 0.0).map(|c| c.least)
-}
-
-/// [`check`], or [`check_cover`] with a `share`, of a path that may begin and end up to
+/// [`check`] of a path that need not end at the goal where a `share` of the parked footprint is given,
+/// which it covers at least, and that may begin and end up to
 /// `contact_m` metres deep in obstacles, with all that it measures: each is only left from the start
 /// on, and only entered towards the end.
 pub fn measure(
