@@ -274,7 +274,7 @@ fn refuses_settings_by_name() {
     };
     let message = complaint(&|c| c.extreme.bay_spot_width = [1.5, 2.0]);
     assert!(message.contains("extreme.bay_spot_width is [1.5, 2.0]"), "{message}");
-    assert!(complaint(&|c| c.start_x = [-7.0, -14.0]).contains("start_x"));
+    assert!(complaint(&|c| c.start_reach = [-1.0, -2.0]).contains("start_reach"));
     assert!(complaint(&|c| c.lane_car_probability = f64::NAN).contains("lane_car_probability"));
     let truck = Vehicle { length: 9.0, wheelbase: 5.0, ..vehicle };
     let message = GeneratorConfig::default().validate(&truck).unwrap_err().to_string();

@@ -84,6 +84,7 @@ fn every_pose_the_knn_selects_has_a_free_curve_in_the_scenes_own_cell() {
 fn no_method_fails_on_900_scenes() {
     let models = Models::load(&["models/knn.bin"]).unwrap();
     let scenes = suite::generated(
+        &GeneratorConfig::default(),
         &models.vehicle().expect("the model knows its vehicle"),
         &ParkingType::ALL,
         &Level::ALL,
@@ -113,7 +114,9 @@ fn settings_decide_what_is_tried_before_a_search() {
     let models = Models::load(&["models/knn.bin"]).unwrap();
     let vehicle = models.vehicle().unwrap();
     let kind = [ParkingType::Parallel];
-    let scenes = suite::generated(&vehicle, &kind, &[Level::Extreme], 40, 4242).unwrap();
+    let scenes =
+        suite::generated(&GeneratorConfig::default(), &vehicle, &kind, &[Level::Extreme], 40, 4242)
+            .unwrap();
     let plans = |n3p: RankedConfig| {
         let settings = MethodSettings { n3p, ..MethodSettings::default() };
         let mut planner = Method::N3P.build(&models, &settings).unwrap();

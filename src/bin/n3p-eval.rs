@@ -17,6 +17,7 @@ use n3p::n3p::{Method, MethodSettings, Models};
 use n3p::planners::goals::Terms;
 use n3p::planners::{Budget, Effort};
 use n3p::vehicle::Vehicle;
+use n3p::world::generate::GeneratorConfig;
 use n3p::world::{Level, ParkingType};
 
 /// Evaluates planning methods on generated scenes, or on a folder of scene files.
@@ -190,8 +191,15 @@ fn choose(args: &Args, vehicle: &Vehicle, methods: &[Method], models: &Models) -
         None => ParkingType::ALL.into_iter().filter(known).collect(),
     };
     let levels = args.level.map_or(Level::ALL.to_vec(), |l| vec![l]);
-    let cases = suite::generated(vehicle, &kinds, &levels, args.count as usize, args.seed)
-        .or_bad_input()?;
+    let cases = suite::generated(
+        &GeneratorConfig::default(),
+        vehicle,
+        &kinds,
+        &levels,
+        args.count as usize,
+        args.seed,
+    )
+    .or_bad_input()?;
     let title = format!(
         "{} generated, {} of each type and level, seed {}",
         cases.len(),

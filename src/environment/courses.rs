@@ -80,7 +80,8 @@ fn cell_problem(vehicle: &Vehicle, stratum: Stratum, rng: &mut ChaCha8Rng) -> Pr
     let mut between = |[min, max]: [f64; 2]| rng.random_range(min..=max);
     let grid = Grid::default();
     // Starts lie as far behind as in generated scenes, with the car's own length behind them.
-    let grid = grid.with_lane_behind(vehicle.length - generator.start_x[0] - grid.back);
+    let start_x = generator.start_x(vehicle);
+    let grid = grid.with_lane_behind(vehicle.length - start_x[0] - grid.back);
     loop {
         let lane_width = between(LANE_WIDTH);
         let kind = stratum.kind;
@@ -93,7 +94,7 @@ fn cell_problem(vehicle: &Vehicle, stratum: Stratum, rng: &mut ChaCha8Rng) -> Pr
         let Ok(mut problem) = Problem::in_cell(&grid, &cell, *vehicle, goal) else { continue };
         let [lane, _] = grid.regions(&cell);
         let start = (0..DRAWS).find_map(|_| {
-            let x = between(generator.start_x);
+            let x = between(start_x);
             let y = between([lane.min.y, lane.max.y]);
             let heading = generator.start_heading;
             let start = Pose::new(x, y, between([-heading, heading]));

@@ -3,8 +3,8 @@
 //! them inclined; three levels of difficulty; never a fully blocked way.
 //!
 //! Everything is laid out in the **spot frame**: origin at the spot's centre, +x along the
-//! lane in the direction of travel, +y from the spot toward the lane. The ego car comes
-//! from −x. With [`GeneratorConfig::world_frame`] the finished scene is put anywhere in
+//! lane in the direction of travel, +y from the spot toward the lane. The ego car stands anywhere in
+//! the lane, before the spot or beyond it, and heads along +x. With [`GeneratorConfig::world_frame`] the finished scene is put anywhere in
 //! the world, mirrored or not.
 //!
 //! A scene depends on its arguments alone: the same `(config, vehicle, kind, level, seed,
@@ -68,8 +68,8 @@ pub struct GeneratorConfig {
     pub incline_probability: f64,
     /// Largest incline of a dead-end wall, radians from square to the lane.
     pub max_incline: f64,
-    /// x of the start, `[min, max]` metres.
-    pub start_x: [f64; 2],
+    /// x of the start, `[min, max]` vehicle lengths, never beyond the dead end: the paper's ±N·l_car.
+    pub start_reach: [f64; 2],
     /// The start heading lies within ± this, radians.
     pub start_heading: f64,
     /// Clearance of the start footprint from the lane's borders, metres.
@@ -111,7 +111,7 @@ impl Default for GeneratorConfig {
             passing_room: 1.4,
             incline_probability: 0.4,
             max_incline: 15.0_f64.to_radians(),
-            start_x: [-14.0, -7.0],
+            start_reach: [-3.0, 3.0],
             start_heading: FRAC_PI_6,
             start_lane_clearance: 0.25,
             start_clearance: 0.2,
@@ -145,6 +145,11 @@ impl GeneratorConfig {
     /// Depth of a spot, metres.
     pub fn depth(&self, kind: ParkingType) -> f64 {
         if kind.is_bay() { self.bay_depth } else { self.parallel_depth }
+    }
+
+    /// x of the start, `[min, max]` metres.
+    pub fn start_x(&self, vehicle: &Vehicle) -> [f64; 2] {
+        self.start_reach.map(|lengths| lengths * vehicle.length)
     }
 
     /// Checks every field, and that `vehicle` fits into the spots and the lane.
@@ -189,7 +194,8 @@ impl GeneratorConfig {
         number("passing_room", self.passing_room, 2.0 * room, 50.0)?;
         number("incline_probability", self.incline_probability, 0.0, 1.0)?;
         number("max_incline", self.max_incline, 0.0, 0.8)?;
-        range("start_x", self.start_x, -EXTENT, -vehicle.front_extent())?;
+        let farthest = EXTENT / length;
+        range("start_reach", self.start_reach, -farthest, farthest)?;
         number("start_heading", self.start_heading, 0.0, PI)?;
         number("start_lane_clearance", self.start_lane_clearance, 0.0, 5.0)?;
         number("start_clearance", self.start_clearance, 0.0, self.start_lane_clearance)
@@ -222,7 +228,7 @@ pub fn generate(
         polygons: Vec::new(),
     };
     let dead_end = lot.lay_out(kind, config.level(level));
-    let start = lot.start();
+    let start = lot.start(dead_end);
     let goal = vehicle.rear_axle(Pose::new(0.0, 0.0, kind.goal_heading()));
     let bounds = Aabb::new(-EXTENT, -lot.boundary, dead_end.unwrap_or(EXTENT), lot.top())
         .inflated(2.0 * WALL);
@@ -430,12 +436,14 @@ impl Lot<'_> {
         self.polygons.push(moved(&car, Vec2::new(x, y)));
     }
 
-    /// A free start pose in the lane.
-    fn start(&mut self) -> Pose {
+    /// A free start pose in the lane, on this side of the dead end.
+    fn start(&mut self, dead_end: Option<f64>) -> Pose {
         let c = self.config;
+        let [first, last] = c.start_x(self.vehicle);
+        let last = dead_end.map_or(last, |d| last.min(d.max(first)));
         let lane = [self.boundary + c.start_lane_clearance, self.top() - c.start_lane_clearance];
         for _ in 0..1000 {
-            let x = self.between(c.start_x);
+            let x = self.between([first, last]);
             let y = self.between(lane);
             let pose = Pose::new(x, y, self.between([-c.start_heading, c.start_heading]));
             let extent = self.vehicle.footprint_at(pose).aabb();
@@ -446,7 +454,7 @@ impl Lot<'_> {
             }
         }
         // Along the spot's row: nothing ever stands there.
-        Pose::new(c.start_x[0], lane[0] + self.vehicle.width / 2.0, 0.0)
+        Pose::new(first, lane[0] + self.vehicle.width / 2.0, 0.0)
     }
 
     fn somewhere(&mut self) -> Frame {

@@ -73,19 +73,19 @@ pub const MAX_COUNT: usize = 100_000;
 
 /// Generated scenes: `count` of each type and level, a function of the seed alone.
 pub fn generated(
+    config: &GeneratorConfig,
     vehicle: &Vehicle,
     kinds: &[ParkingType],
     levels: &[Level],
     count: usize,
     seed: u64,
 ) -> Result<Vec<Case>, SuiteError> {
-    let config = GeneratorConfig::default();
     config.validate(vehicle)?;
     let mut cases = Vec::new();
     for &kind in kinds {
         for &level in levels {
             for index in 0..count as u64 {
-                let scene = generate(&config, vehicle, kind, level, seed, index);
+                let scene = generate(config, vehicle, kind, level, seed, index);
                 cases.push(Case { scene, kind: Some(kind), level: Some(level) });
             }
         }

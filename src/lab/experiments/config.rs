@@ -16,6 +16,7 @@ use crate::n3p::guided::RankedConfig;
 use crate::n3p::{Method, MethodSettings};
 use crate::planners::{Budget, Effort, HybridAStarConfig, Problem};
 use crate::vehicle::Vehicle;
+use crate::world::generate::GeneratorConfig;
 use crate::world::{Level, ParkingType};
 
 /// The version of the format that this crate reads.
@@ -120,6 +121,9 @@ pub struct EvaluateConfig {
     pub count: usize,
     /// Seed of the scenes and of the bootstrap intervals.
     pub seed: u64,
+    /// What scenes are drawn from.
+    #[serde(default)]
+    pub generator: GeneratorConfig,
     /// Expansion budget per episode.
     #[serde(default = "max_expansions")]
     pub max_expansions: usize,
@@ -250,6 +254,7 @@ impl ExperimentConfig {
                 }
             }
         }
+        e.generator.validate(&self.vehicle).map_err(|m| format!("evaluate.{m}"))?;
         e.planner.validate().map_err(|m| format!("evaluate.planner.{m}"))?;
         e.n3p.validate().map_err(|m| format!("evaluate.n3p.{m}"))?;
         e.rl.validate().map_err(|m| format!("evaluate.rl.{m}"))?;

@@ -37,7 +37,8 @@ pub(super) fn points(
     let models = Models::load(&files)?;
     let e = &config.evaluate;
     let suite_config = e.suite(&curve.methods);
-    let cases = suite::generated(&config.vehicle, kinds, &e.levels, curve.count, curve.seed)?;
+    let cases =
+        suite::generated(&e.generator, &config.vehicle, kinds, &e.levels, curve.count, curve.seed)?;
     let bar = progress::bar((cases.len() * curve.methods.len()) as u64, "learning curve");
     let rows = suite::run(&cases, &models, &suite_config, 0, |_, _| {
         bar.inc(1);

@@ -441,7 +441,7 @@ impl Runner<'_> {
         let models = Models::load(&self.model_files()).map_err(|error| self.model_error(error))?;
         let suite_config = e.suite(&e.methods);
         let vehicle = &self.config.vehicle;
-        let cases = suite::generated(vehicle, &e.types, &e.levels, e.count, e.seed)?;
+        let cases = suite::generated(&e.generator, vehicle, &e.types, &e.levels, e.count, e.seed)?;
         suite::check(&cases, &models, &suite_config)?;
         Ok((models, cases, suite_config))
     }
