@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::ndarray::Dimension;
+use numpy::{PyArray, PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyFloat, PyList, PyString, PyTuple, PyType};
@@ -81,6 +82,7 @@ pub fn numbers<const N: usize>(object: &Bound<'_, PyAny>) -> Found<[f64; N]> {
         if array.len() != N {
             return Err(wrong());
         }
+        let array = regular(array)?;
         // SAFETY: as in `rows_of`.
         let view = unsafe { array.as_array() };
         row.iter_mut().zip(view).for_each(|(value, given)| *value = *given);
@@ -112,15 +114,41 @@ pub fn rows<const N: usize>(object: &Bound<'_, PyAny>) -> Found<Vec<[f64; N]>> {
 }
 
 fn rows_of<const N: usize>(array: &Bound<'_, PyArray2<f64>>) -> Found<Vec<[f64; N]>> {
-    let shape = array.shape();
-    if shape[1] != N && shape[0] > 0 {
-        let [rows, columns] = [shape[0], shape[1]];
+    let [rows, columns] = [array.shape()[0], array.shape()[1]];
+    if rows == 0 {
+        return Ok(Vec::new());
+    }
+    if columns != N {
         return Err(Wrong::new(format!("has shape ({rows}, {columns}); expected (any, {N})")));
     }
-    // SAFETY: the values are copied before anything of Python's runs that could write to them; a
-    // borrow that numpy's Rust side keeps book of would cost as much as the copy.
+    let array = regular(array)?;
+    // SAFETY: it is aligned and its strides are whole values, so that the view has its very values;
+    // these are copied before anything of Python's runs that could write to them. A borrow that
+    // numpy's Rust side keeps book of would cost as much as the copy.
     let view = unsafe { array.as_array() };
     Ok(view.rows().into_iter().map(|row| std::array::from_fn(|i| row[i])).collect())
+}
+
+/// `array`, or a copy of it where Rust cannot read it in place: where it is not aligned, or where its
+/// strides, which count bytes, are no whole values. Views of packed records are so, and `as_array`
+/// neither minds nor copes.
+fn regular<'py, D: Dimension>(
+    array: &Bound<'py, PyArray<f64, D>>,
+) -> Found<Bound<'py, PyArray<f64, D>>> {
+    let is_regular = |array: &Bound<'py, PyArray<f64, D>>| {
+        let whole = |stride: &isize| stride % size_of::<f64>() as isize == 0;
+        array.data().is_aligned() && array.strides().iter().all(whole)
+    };
+    if is_regular(array) {
+        return Ok(array.clone());
+    }
+    static ARRAY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    let copied = ARRAY.import(array.py(), "numpy", "array").and_then(|copy| copy.call1((array,)));
+    let copied = copied.map_err(Wrong::new)?.cast_into().map_err(Wrong::new)?;
+    match is_regular(&copied) {
+        true => Ok(copied),
+        false => Err(Wrong::new("is an array that numpy cannot align")),
+    }
 }
 
 /// `object` as an array of 64-bit floats, itself where it is one.
@@ -197,13 +225,16 @@ fn add_grid(lot: &mut Lot, object: &Bound<'_, PyAny>) -> Found<()> {
     }
     let occupied =
         if kind == "b" { array } else { array.call_method1("__ne__", (0,)).map_err(python)? };
+    // As bytes: in arrays of bool that are views of something else, Python keeps any values, and a
+    // `bool` of Rust's is nothing but 0 or 1.
+    let occupied = occupied.call_method1("view", ("uint8",)).map_err(python)?;
     let shape = || cells.getattr("shape").map_or_else(|_| shown(cells), |s| s.to_string());
     let occupied = occupied
-        .cast::<PyArray2<bool>>()
+        .cast::<PyArray2<u8>>()
         .map_err(|_| of_cells(format!("has shape {}; expected (rows, columns)", shape())))?;
     let occupied = occupied.try_readonly().map_err(|e| of_cells(e.to_string()))?;
     let view = occupied.as_array();
-    let flat: Vec<bool> = view.iter().copied().collect();
+    let flat: Vec<bool> = view.iter().map(|&cell| cell != 0).collect();
     lot.grid(origin, resolution, view.ncols(), &flat);
     Ok(())
 }

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import GOAL, POLYGONS, ROOT, START
+from numpy.lib.recfunctions import structured_to_unstructured
 
 import n3p
 
@@ -72,6 +73,24 @@ def test_a_trajectory_is_columns(parker):
         plan.trajectory(acceleration="fast")
 
 
+def within(rows, offset, stride):
+    """The rows as a view that begins `offset` bytes into a buffer and takes `stride` for a row."""
+    rows = np.array(rows)
+    view = np.ndarray(rows.shape, float, bytearray(offset + stride * len(rows)), offset, (stride, 8))
+    view[:] = rows
+    return view
+
+
+def among_records(rows):
+    """The rows as the first fields of records that have an `int32` behind them, and no gaps."""
+    rows = np.array(rows)
+    names = [f"c{i}" for i in range(rows.shape[1])]
+    records = np.zeros(len(rows), [*((name, float) for name in names), ("id", np.int32)])
+    for name, column in zip(names, rows.T):
+        records[name] = column
+    return structured_to_unstructured(records[names])
+
+
 @pytest.mark.parametrize(
     "form",
     [
@@ -83,6 +102,11 @@ def test_a_trajectory_is_columns(parker):
         lambda rows: tuple(map(list, rows)),
         lambda rows: [np.array(row) for row in rows],
         lambda rows: [[np.float32(v) for v in row] for row in rows],
+        among_records,
+        lambda rows: within(rows, 0, 28),
+        lambda rows: within(rows, 1, 32),
+        lambda rows: within(rows, 4, 28)[::-1][::-1],
+        lambda rows: np.frombuffer(b"?" + np.array(rows).tobytes(), offset=1).reshape(len(rows), -1),
     ],
 )
 def test_numbers_may_come_in_any_form(parker, form):
@@ -91,6 +115,16 @@ def test_numbers_may_come_in_any_form(parker, form):
     expected = parker.plan(START, (0.0, -1.5, 1.5), polygons=polygons)
     given = parker.plan(form([START])[0], form([(0.0, -1.5, 1.5)])[0], polygons=map(form, polygons))
     assert given.to_json() == expected.to_json()
+
+
+def test_views_of_records_are_copied():
+    """Theirs are strides that are no whole numbers of values, and values that are not aligned."""
+    rows = np.arange(8.0).reshape(4, 2)
+    assert among_records(rows).strides == (20, 8)
+    for view in (among_records(rows), within(rows, 1, 16), within(rows, 0, 20)[::-1]):
+        scene = n3p.Scene(view[:3, 0], (0, 0, 0), points=view)
+        assert scene.points.tolist() == view.tolist()
+        assert scene.start.tolist() == view[:3, 0].tolist()
 
 
 def test_whole_numbers_are_numbers(parker):
@@ -103,7 +137,9 @@ def test_a_grid_is_what_it_holds(parker):
     cells[10:30, 20:40] = True
     square = [(-6.0, -2.0), (-2.0, -2.0), (-2.0, 2.0), (-6.0, 2.0)]
     expected = parker.plan(START, (6.0, 0.0, 0.0), polygons=[square])
-    for array in (cells, cells.astype(np.uint8) * 100, cells.astype(float), cells.tolist()):
+    full = cells.astype(np.uint8) * 100
+    # The third is an array of bool that holds other bytes than 0 and 1.
+    for array in (cells, full, full.view(bool), cells.astype(float), cells.tolist()):
         plan = parker.plan(START, (6.0, 0.0, 0.0), grid=(array, 0.2, (-10.0, -4.0)))
         np.testing.assert_allclose(plan.poses, expected.poses, atol=1e-6)
     turned = np.asfortranarray(cells)[:, ::-1][:, ::-1]
