@@ -14,7 +14,7 @@ use n3p::n3p::MethodSettings;
 use n3p::{Method, Models, world};
 
 use crate::errors::{Fault, guarded};
-use crate::parker::Settings;
+use crate::parker::{Settings, method};
 use crate::scene::scene;
 
 /// Runs methods on scenes: one row for each scene and method.
@@ -109,7 +109,8 @@ fn methods(methods: Option<&Bound<'_, PyAny>>) -> Result<Vec<Method>, Fault> {
     }
     let mut all: Vec<Method> = Vec::new();
     for name in methods.try_iter().map_err(|_| wrong())? {
-        let method = crate::inputs::text(&name?, "methods")?;
+        let name: String = crate::inputs::text(&name?, "methods")?;
+        let method = method(&name, "methods")?;
         if all.contains(&method) {
             return Err(Fault::bad(format!("methods: names {method} twice; once is enough")));
         }

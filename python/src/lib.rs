@@ -21,7 +21,7 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _n3p(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    m.add("METHODS", n3p::Method::all().map(n3p::Method::name).collect::<Vec<_>>())?;
+    m.add("METHODS", parker::methods().map(n3p::Method::name).collect::<Vec<_>>())?;
     m.add_class::<vehicle::Vehicle>()?;
     m.add_class::<scene::Scene>()?;
     m.add_class::<parker::Parker>()?;

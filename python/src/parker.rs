@@ -45,6 +45,23 @@ use crate::vehicle::{Vehicle, vehicle};
 #[pyclass(frozen, module = "n3p", name = "Parker")]
 pub struct Parker(n3p::Parker);
 
+/// The methods that this package can plan by: all but policies, for which it has no engine.
+pub fn methods() -> impl Iterator<Item = Method> {
+    Method::all().filter(|method| !method.is_policy())
+}
+
+/// The one of this name; `argument` is where it was given.
+pub fn method(name: &str, argument: &str) -> Result<Method, Fault> {
+    methods().find(|method| method.name() == name).ok_or_else(|| {
+        let what = match name.parse::<Method>() {
+            Ok(policy) => format!("{policy} is a policy, which this package cannot drive"),
+            Err(_) => format!("unknown method {name:?}"),
+        };
+        let expected: Vec<_> = methods().map(Method::name).collect();
+        Fault::bad(format!("{argument}: {what}; expected one of {}", expected.join(", ")))
+    })
+}
+
 /// How a planner is to work, as keyword arguments.
 pub struct Settings<'a, 'py> {
     pub models: Option<&'a Bound<'py, PyAny>>,
@@ -100,7 +117,7 @@ impl Parker {
         max_expansions: i64,
     ) -> Result<Self, Fault> {
         let vehicle = self::vehicle(vehicle)?;
-        let method: Method = method.parse().map_err(|e| Fault::bad(format!("method: {e}")))?;
+        let method = self::method(method, "method")?;
         let settings = Settings { models, effort, max_expansions };
         let (models, budget) = (settings.models(&[method], &vehicle)?, settings.budget()?);
         let made = py.detach(|| guarded(|| n3p::Parker::by(method, vehicle, models)))?;

@@ -213,6 +213,14 @@ def test_every_method_plans(method):
     assert plan.method == method and plan.poses[-1].tolist() == scene.goal.tolist()
 
 
+@pytest.mark.parametrize("method", ["rl-simple", "rl-eval", "policy"])
+def test_policies_are_not_for_this_package(method):
+    assert method not in n3p.METHODS
+    for use in (lambda: n3p.Parker(method=method), lambda: n3p.evaluate([], [method])):
+        with pytest.raises(n3p.BadInput, match=f"{method} is a policy.*expected one of ha, .*n3p$"):
+            use()
+
+
 def test_settings_are_heard():
     scene = n3p.load_scene(ROOT / "examples/scenes/forward.json")
     usual = n3p.Parker(method="ha-rs").plan_scene(scene)
