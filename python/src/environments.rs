@@ -135,23 +135,18 @@ impl Environments {
         if only.as_ref().is_some_and(|only| only.len() != self.count) {
             return Err(Fault::bad(format!("reset_mask: expected shape ({},)", self.count)));
         }
-        let seen = py.detach(|| {
-            let mut slots = self.slots.lock().map_err(|_| broken())?;
-            let Slots { seed: known, all } = &mut *slots;
+        let seen = self.locked(py, |Slots { seed: known, all }| {
             if let Some(seed) = seed {
                 *known = seed;
                 (0..).zip(all.iter_mut()).for_each(|(i, slot)| slot.next = i);
             }
-            let seed = *known;
             let chosen = |i: usize| only.as_ref().is_none_or(|only| only[i]);
-            guarded(|| {
-                for (i, slot) in all.iter_mut().enumerate() {
-                    if chosen(i) || slot.env.is_none() {
-                        self.begin(slot, seed);
-                    }
+            for (i, slot) in all.iter_mut().enumerate() {
+                if chosen(i) || slot.env.is_none() {
+                    self.begin(slot, *known);
                 }
-                all.iter().map(|slot| slot.env().observe()).collect::<Vec<_>>()
-            })
+            }
+            Ok(all.iter().map(|slot| slot.env().observe()).collect::<Vec<_>>())
         })?;
         Ok(arrays(py, &seen))
     }
@@ -173,16 +168,14 @@ impl Environments {
             let text = format!("actions[{i}]: is {:?}; expected numbers from -1 to 1", actions[i]);
             return Err(Fault::bad(text));
         }
-        let outcomes = py.detach(|| {
-            let mut slots = self.slots.lock().map_err(|_| broken())?;
-            let Slots { seed, all } = &mut *slots;
+        let outcomes = self.locked(py, |Slots { seed, all }| {
             if all.iter().any(|slot| slot.env.is_none()) {
                 return Err(Fault::Bug("reset() was not called; call it before step()".to_owned()));
             }
             if self.autoreset == Autoreset::Never && all.iter().any(|slot| slot.ended) {
                 return Err(Fault::Bug("the episode has ended; call reset()".to_owned()));
             }
-            guarded(|| self.step_all(all, &actions, *seed))
+            Ok(self.step_all(all, &actions, *seed))
         })?;
         let seen: Vec<Observation> = outcomes.iter().map(|o| o.seen).collect();
         let code = |o: &Outcome| match o.end {
@@ -211,6 +204,23 @@ impl Slot {
 }
 
 impl Environments {
+    /// Does `work` while other Python threads run. The lock is taken within the guard, so that a
+    /// panic poisons it: what is left half done is not used again.
+    fn locked<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut Slots) -> Result<T, Fault> + Send,
+    ) -> Result<T, Fault> {
+        let locked = || {
+            let mut slots = self.slots.lock().map_err(|_| {
+                let text = "an earlier step failed by a bug of n3p; make new environments";
+                Fault::Bug(text.to_owned())
+            })?;
+            work(&mut slots)
+        };
+        py.detach(|| guarded(locked)).flatten()
+    }
+
     /// Begins the next episode.
     fn begin(&self, slot: &mut Slot, seed: u64) {
         let index = slot.next;
@@ -275,10 +285,6 @@ impl Environments {
         }
         Outcome { seen, reward: step.reward, end: step.end, scripted, driven: step.action, last }
     }
-}
-
-fn broken() -> Fault {
-    Fault::Bug("an earlier step failed by a bug of n3p; make new environments".to_owned())
 }
 
 fn arrays<'py>(py: Python<'py>, seen: &[Observation]) -> Seen<'py> {
