@@ -2,13 +2,14 @@
 
 use std::sync::OnceLock;
 
-use numpy::{Element, PyArray1, PyArray2, PyArrayMethods};
+use numpy::ndarray::Dimension;
+use numpy::{Element, PyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyDict;
 
-use n3p::curves::TrajectoryLimits;
 use n3p::curves::trajectory::Moment;
+use n3p::curves::{Segment, TrajectoryLimits};
 use n3p::output::PathFile;
 use n3p::world::ParkingType;
 
@@ -25,6 +26,7 @@ pub struct Plan {
     poses: PyOnceLock<Py<PyArray2<f64>>>,
     gears: PyOnceLock<Py<PyArray1<i8>>>,
     steer: PyOnceLock<Py<PyArray1<f64>>>,
+    segments: PyOnceLock<Py<PyArray2<f64>>>,
 }
 
 impl Plan {
@@ -35,6 +37,7 @@ impl Plan {
             poses: PyOnceLock::new(),
             gears: PyOnceLock::new(),
             steer: PyOnceLock::new(),
+            segments: PyOnceLock::new(),
         }
     }
 
@@ -66,7 +69,7 @@ pub fn table<T: Element>(
 /// Name and value of a column.
 type Column = (&'static str, fn(&Moment) -> f64);
 
-fn frozen1<T: Element>(array: Bound<'_, PyArray1<T>>) -> Py<PyArray1<T>> {
+fn frozen<T: Element, D: Dimension>(array: Bound<'_, PyArray<T, D>>) -> Py<PyArray<T, D>> {
     array.readwrite().make_nonwriteable();
     array.unbind()
 }
@@ -76,19 +79,15 @@ impl Plan {
     /// Rear-axle poses at most 5 cm apart, float64 (N, 3): x, y (metres), heading (radians).
     #[getter]
     fn poses<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        let array = self.poses.get_or_init(py, || {
-            let array = rows(py, self.file().poses.iter().copied());
-            array.readwrite().make_nonwriteable();
-            array.unbind()
-        });
-        array.bind(py).clone()
+        let make = || frozen(rows(py, self.file().poses.iter().copied()));
+        self.poses.get_or_init(py, make).bind(py).clone()
     }
 
     /// Gear of the motion that follows each pose, int8 (N,): 1 forward, -1 backward. The last one is
     /// that of the motion that led there.
     #[getter]
     fn gears<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i8>> {
-        let make = || frozen1(PyArray1::from_slice(py, &self.file().gears));
+        let make = || frozen(PyArray1::from_slice(py, &self.file().gears));
         self.gears.get_or_init(py, make).bind(py).clone()
     }
 
@@ -96,16 +95,18 @@ impl Plan {
     /// positive to the left.
     #[getter]
     fn steer<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let make = || frozen1(PyArray1::from_slice(py, &self.file().steer));
+        let make = || frozen(PyArray1::from_slice(py, &self.file().steer));
         self.steer.get_or_init(py, make).bind(py).clone()
     }
 
     /// The path as motions of constant curvature, float64 (M, 2): curvature (1/m, positive to the
-    /// left), length (metres, negative backward). They begin at ``poses[0]``.
+    /// left) and length (metres, negative backward). Driven one after the other from ``poses[0]``
+    /// they lead to ``poses[-1]``, as exactly as numbers add up.
     #[getter]
     fn segments<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        let path = self.plan.path();
-        rows(py, path.segments.iter().map(|s| [s.curvature, s.length]))
+        let row = |segment: &Segment| [segment.curvature, segment.length];
+        let make = || frozen(rows(py, self.plan.path().segments.iter().map(row)));
+        self.segments.get_or_init(py, make).bind(py).clone()
     }
 
     /// Driven length, metres.
@@ -153,8 +154,8 @@ impl Plan {
 
     /// The method that planned it.
     #[getter]
-    fn method(&self) -> &str {
-        &self.file().method
+    fn method(&self) -> &'static str {
+        self.plan.method().name()
     }
 
     /// The path in time.
@@ -222,7 +223,7 @@ impl Plan {
 
     /// The path file of ``n3p-plan --out`` (docs/formats.md), to the byte.
     fn to_json(&self) -> String {
-        serde_json::to_string(self.file()).expect("plain numbers and strings")
+        self.file().to_json()
     }
 
     /// How many poses there are.
@@ -233,7 +234,7 @@ impl Plan {
     fn __repr__(&self) -> String {
         format!(
             "<Plan by {}: {:.2} m, {} direction changes>",
-            self.file().method,
+            self.plan.method(),
             self.plan.length(),
             self.plan.direction_changes()
         )

@@ -52,9 +52,26 @@ def test_arrays_have_the_types_and_shapes_they_say(parker):
     assert plan.method == "n3p" and plan.goal_index == 0 and plan.route
     file = json.loads(plan.to_json())
     assert file["poses"] == plan.poses.tolist() and file["steer"] == plan.steer.tolist()
-    assert plan.poses is plan.poses
-    with pytest.raises(ValueError):
-        plan.poses[0] = 0.0
+    assert repr(plan).startswith(f"<Plan by n3p: {plan.length:.2f} m")
+    for name in ("poses", "gears", "steer", "segments"):
+        assert getattr(plan, name) is getattr(plan, name)
+        with pytest.raises(ValueError):
+            getattr(plan, name)[0] = 0
+
+
+def test_segments_lead_from_start_to_goal(parker):
+    plan = parker.plan(START, GOAL, polygons=POLYGONS, tolerance=(0.2, 0.05))
+    x, y, heading = plan.poses[0]
+    for curvature, length in plan.segments:
+        turned = heading + curvature * length
+        if curvature:
+            x += (np.sin(turned) - np.sin(heading)) / curvature
+            y -= (np.cos(turned) - np.cos(heading)) / curvature
+        else:
+            x, y = x + length * np.cos(heading), y + length * np.sin(heading)
+        heading = turned
+    assert (x, y) == pytest.approx(plan.poses[-1, :2], abs=1e-6)
+    assert np.cos(heading - plan.poses[-1, 2]) == pytest.approx(1.0)
 
 
 def test_a_trajectory_is_columns(parker):
