@@ -1,13 +1,15 @@
 //! `n3p.Scene`, and where scenes come from.
 
+use std::fmt;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
-use serde::Deserialize;
+use pyo3::types::{PyDict, PyString};
+use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
+use serde_json::Value;
 
 use n3p::geometry::Pose;
 use n3p::world;
@@ -62,11 +64,57 @@ pub struct Scene {
     pub scene: Arc<world::Scene>,
     /// Of generated scenes.
     pub level: Option<Level>,
+    entries: OnceLock<Entries>,
 }
 
+/// What makes a scene again: `_unpickled`, and its arguments.
+type Remade<'py> = (Bound<'py, PyAny>, (String, Option<&'static str>));
+
 impl Scene {
-    fn new_from(scene: world::Scene) -> Result<Self, Fault> {
-        checked(scene).map(|scene| Self { scene: Arc::new(scene), level: None })
+    fn new_from(scene: world::Scene, level: Option<Level>) -> Self {
+        Self { scene: Arc::new(scene), level, entries: OnceLock::new() }
+    }
+
+    fn entries(&self) -> &Entries {
+        self.entries.get_or_init(|| {
+            serde_json::from_str(&self.to_json()).expect("a scene is a map with text for keys")
+        })
+    }
+}
+
+/// What the scene format has of a scene, in its order: keys, and the JSON of each value.
+struct Entries(Vec<(String, String)>);
+
+impl Entries {
+    /// The JSON of the value of `key`, which may be anything of Python's.
+    fn get(&self, key: &Bound<'_, PyAny>) -> Option<&str> {
+        let key = key.cast::<PyString>().ok()?;
+        let key = key.to_cow().ok()?;
+        self.0.iter().find(|(own, _)| *own == key).map(|(_, json)| json.as_str())
+    }
+}
+
+impl<'de> Deserialize<'de> for Entries {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct InOrder;
+
+        impl<'de> Visitor<'de> for InOrder {
+            type Value = Entries;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a map")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Entries, A::Error> {
+                let mut entries = Vec::new();
+                while let Some((key, value)) = map.next_entry::<_, Value>()? {
+                    entries.push((key, value.to_string()));
+                }
+                Ok(Entries(entries))
+            }
+        }
+
+        deserializer.deserialize_map(InOrder)
     }
 }
 
@@ -126,8 +174,7 @@ pub fn load_scene(path: &Bound<'_, PyAny>) -> Result<Scene, Fault> {
     let Some(path) = inputs::path(path) else {
         return Err(Fault::bad("path: expected text or an os.PathLike"));
     };
-    let scene = world::Scene::read(&path).map_err(Fault::bad)?;
-    Ok(Scene { scene: Arc::new(scene), level: None })
+    Ok(Scene::new_from(world::Scene::read(&path).map_err(Fault::bad)?, None))
 }
 
 /// Makes scenes as in the paper's evaluation; the same arguments give the same scenes, and those of
@@ -175,8 +222,7 @@ pub fn generate(
     let made = |index| world::generate::generate(&config, &vehicle, kind, level, seed, index);
     let indices = first..first.saturating_add(count as u64);
     let scenes: Vec<_> = py.detach(|| guarded(|| indices.map(made).collect()))?;
-    let scene = |scene| Scene { scene: Arc::new(scene), level: Some(level) };
-    Ok(scenes.into_iter().map(scene).collect())
+    Ok(scenes.into_iter().map(|scene| Scene::new_from(scene, Some(level))).collect())
 }
 
 /// A seed of Rust's.
@@ -206,7 +252,7 @@ impl Scene {
         let lot = LotArguments { polygons, polylines, points, grid, bounds }.lot()?;
         let request = RequestArguments { start, goal, goals, tolerance, parking_type }.request()?;
         let scene = lot.scene(self::vehicle(vehicle)?, &request);
-        Self::new_from(world::Scene { name, ..scene })
+        Ok(Self::new_from(checked(world::Scene { name, ..scene })?, None))
     }
 
     /// The scene of a dict of the scene format (docs/formats.md). Arrays count as lists.
@@ -215,13 +261,20 @@ impl Scene {
         if !scene.is_instance_of::<PyDict>() {
             return Err(Fault::bad("scene: expected a dict"));
         }
-        Ok(Self { scene: Arc::new(of_dict(scene)?), level: None })
+        Ok(Self::new_from(of_dict(scene)?, None))
     }
 
     /// The scene of the text of a JSON scene file.
     #[staticmethod]
     fn from_json(text: &str) -> Result<Self, Fault> {
-        Ok(Self { scene: Arc::new(of_json(text)?), level: None })
+        Ok(Self::new_from(of_json(text)?, None))
+    }
+
+    /// What `__reduce__` told.
+    #[staticmethod]
+    fn _unpickled(text: &str, level: Option<&str>) -> Result<Self, Fault> {
+        let level = level.map(str::parse).transpose().map_err(Fault::bad)?;
+        Ok(Self::new_from(of_json(text)?, level))
     }
 
     /// Name, used in rows and file names.
@@ -296,24 +349,30 @@ impl Scene {
 
     /// The keys of the scene format, so that ``dict(scene)`` works.
     fn keys<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.to_dict(py)?.call_method0("keys")
+        let keys = PyDict::new(py);
+        for (key, _) in &self.entries().0 {
+            keys.set_item(key, ())?;
+        }
+        keys.call_method0("keys")
     }
 
     fn __getitem__<'py>(&self, key: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        let key_error = |_| PyKeyError::new_err(key.clone().unbind());
-        self.to_dict(key.py())?.get_item(key).map_err(key_error)
+        match self.entries().get(key) {
+            Some(json) => json::loaded(key.py(), json),
+            None => Err(PyKeyError::new_err(key.clone().unbind())),
+        }
     }
 
-    fn __contains__(&self, key: &Bound<'_, PyAny>) -> PyResult<bool> {
-        self.to_dict(key.py())?.contains(key)
+    fn __contains__(&self, key: &Bound<'_, PyAny>) -> bool {
+        self.entries().get(key).is_some()
     }
 
     fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.to_dict(py)?.call_method0("__iter__")
+        self.keys(py)?.call_method0("__iter__")
     }
 
-    fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
-        self.to_dict(py)?.len()
+    fn __len__(&self) -> usize {
+        self.entries().0.len()
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
@@ -327,7 +386,8 @@ impl Scene {
     }
 
     fn __hash__(&self) -> u64 {
-        let [x, y, heading] = <[f64; 3]>::from(self.scene.start).map(f64::to_bits);
+        // 0.0 and -0.0 are equal, and so must be what is made of them here: adding 0.0 makes them so.
+        let [x, y, heading] = <[f64; 3]>::from(self.scene.start).map(|v| (v + 0.0).to_bits());
         x ^ y.rotate_left(21) ^ heading.rotate_left(42) ^ self.scene.obstacles.len() as u64
     }
 
@@ -336,10 +396,8 @@ impl Scene {
         format!("<Scene {name:?}: {} obstacles, {} points>", obstacles.len(), points.len())
     }
 
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
-        let text = slf.get().to_json();
-        Ok((slf.get_type().getattr("from_json")?, PyTuple::new(slf.py(), [text])?))
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Remade<'py>> {
+        let scene = slf.get();
+        Ok((slf.get_type().getattr("_unpickled")?, (scene.to_json(), scene.level())))
     }
 }

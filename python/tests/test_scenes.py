@@ -25,10 +25,24 @@ def test_a_scene_is_its_dict_and_its_file():
     )
     assert scene.to_json() + "\n" == REVERSE.read_text()
     assert [o.tolist() for o in scene.obstacles] == scene["obstacles"]
-    for same in (pickle.loads(pickle.dumps(scene)), copy.deepcopy(scene)):
-        assert same == scene and hash(same) == hash(scene)
-    with pytest.raises(KeyError):
-        scene["gaol"]
+    assert list(scene) == list(scene.keys()) == list(scene.to_dict())
+    assert {"start", "goal"} <= scene.keys() and 3 not in scene
+    for key in ("gaol", 3, "\ud800"):
+        with pytest.raises(KeyError):
+            scene[key]
+    scene["start"].append(0.0)
+    assert scene["start"] == scene.start.tolist()
+
+
+def test_copies_are_equal():
+    for scene in (n3p.load_scene(REVERSE), n3p.generate("reverse", "complex")[0]):
+        for same in (pickle.loads(pickle.dumps(scene)), copy.deepcopy(scene)):
+            assert same == scene and hash(same) == hash(scene) and same.level == scene.level
+
+
+def test_zeros_of_either_sign_are_the_same():
+    scenes = [n3p.Scene((zero, zero, zero), GOAL) for zero in (0.0, -0.0)]
+    assert scenes[0] == scenes[1] and len(set(scenes)) == 1
 
 
 def test_dicts_may_hold_arrays():
