@@ -1,16 +1,15 @@
 //! What was planned.
 
-use std::ffi::c_char;
-use std::iter;
-use std::sync::OnceLock;
+use std::ffi::{CStr, CString, c_char};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use n3p::Plan;
 use n3p::curves::TrajectoryLimits;
-use n3p::output::PathFile;
+use n3p::output::{Driven, PathFile};
 
 use super::handles::Table;
 use super::memory::{Place, fill, read_or};
-use super::status::{Failure, guarded, n3p_status};
+use super::status::{Failure, Result, guarded, n3p_status};
 use super::types::{
     n3p_limits, n3p_limits_default, n3p_moment, n3p_path_pose, n3p_summary, parking_number,
     short_name,
@@ -21,20 +20,37 @@ pub enum n3p_plan {}
 
 pub(crate) static PLANS: Table<Kept> = Table::new("n3p_plan", 4);
 
-/// A plan, with its poses from when somebody asks for them: who asks for their number first asks
-/// twice.
+/// A plan, with what somebody has asked for: who asks for a size first asks twice.
 pub(crate) struct Kept {
     plan: Plan,
     poses: OnceLock<PathFile>,
+    json: OnceLock<CString>,
+    /// The path in time within the limits that were asked for last.
+    driven: Mutex<Option<(TrajectoryLimits, Arc<Driven>)>>,
 }
 
 impl Kept {
     pub fn new(plan: Plan) -> Self {
-        Self { plan, poses: OnceLock::new() }
+        Self { plan, poses: OnceLock::new(), json: OnceLock::new(), driven: Mutex::default() }
     }
 
     fn poses(&self) -> &PathFile {
         self.poses.get_or_init(|| self.plan.poses())
+    }
+
+    fn json(&self) -> &CStr {
+        let json = || CString::new(self.poses().to_json()).expect("JSON escapes what is NUL");
+        self.json.get_or_init(json)
+    }
+
+    fn driven(&self, limits: &TrajectoryLimits) -> Result<Arc<Driven>> {
+        let mut last = self.driven.lock().unwrap_or_else(|e| e.into_inner());
+        if let Some((_, driven)) = last.as_ref().filter(|(of, _)| of == limits) {
+            return Ok(driven.clone());
+        }
+        let driven = self.plan.trajectory(limits);
+        let driven = driven.map_err(|e| Failure::bad_input(format!("limits: {e}")))?;
+        Ok(last.insert((*limits, Arc::new(driven))).1.clone())
     }
 }
 
@@ -105,10 +121,7 @@ pub unsafe extern "C" fn n3p_plan_trajectory(
         let plan = PLANS.get(plan, "plan")?;
         // SAFETY: the caller's word.
         let limits = unsafe { read_or(limits, "limits", n3p_limits_default()) }?;
-        let driven = plan
-            .plan
-            .trajectory(&TrajectoryLimits::from(limits))
-            .map_err(|e| Failure::bad_input(format!("limits: {e}")))?;
+        let driven = plan.driven(&limits.into())?;
         // SAFETY: the caller's word.
         unsafe { fill(driven.moments.iter().map(n3p_moment::from), buffer, capacity, count) }
     })
@@ -128,11 +141,10 @@ pub unsafe extern "C" fn n3p_plan_json(
         // SAFETY: the caller's word.
         let place = unsafe { Place::new(length, "length") }?;
         let plan = PLANS.get(plan, "plan")?;
-        let bytes: Vec<u8> = plan.poses().to_json().into_bytes();
-        let (needed, mut with_nul) = (bytes.len(), 0);
-        let chars: Vec<c_char> = bytes.iter().map(|&b| b as c_char).chain(iter::once(0)).collect();
-        place.put(needed);
+        let text = plan.json().to_bytes_with_nul();
+        let mut with_nul = 0;
+        place.put(text.len() - 1);
         // SAFETY: the caller's word for `buffer`.
-        unsafe { fill(chars.into_iter(), buffer, capacity, &mut with_nul) }
+        unsafe { fill(text.iter().map(|&b| b as c_char), buffer, capacity, &mut with_nul) }
     })
 }

@@ -21,7 +21,8 @@ pub enum n3p_status {
     N3P_BAD_INPUT = 2,
     /// There is no path, or none was found within the budget.
     N3P_NO_PATH = 3,
-    /// The buffer is too small, and nothing was written to it; the count says how much it takes.
+    /// The buffer is too small, and nothing was written to it; the count says how much it takes. Of
+    /// a text the length says it, which counts no NUL: the buffer needs a capacity of one more.
     N3P_BUFFER_TOO_SMALL = 4,
 }
 

@@ -262,6 +262,17 @@ static void buffers(void) {
     n3p_moment *moments = malloc(count * sizeof *moments);
     OK(n3p_plan_trajectory(plan, NULL, moments, count, &count));
     HOLDS(moments[count - 1].speed == 0.0 && moments[count - 1].time > 5.0);
+    /* Other limits are heard, and nothing is left of those that cannot be used. */
+    const double usual = moments[count - 1].time;
+    const size_t usual_count = count;
+    limits = n3p_limits_default();
+    limits.forward_acceleration = limits.backward_acceleration = 4.0;
+    OK(n3p_plan_trajectory(plan, &limits, moments, usual_count, &count));
+    HOLDS(count < usual_count && moments[count - 1].time < usual);
+    limits.forward_acceleration = -1.0;
+    BAD(n3p_plan_trajectory(plan, &limits, moments, usual_count, &count), "acceleration is -1");
+    OK(n3p_plan_trajectory(plan, NULL, moments, usual_count, &count));
+    HOLDS(count == usual_count && moments[count - 1].time == usual);
     free(moments);
 
     size_t length = 0;
