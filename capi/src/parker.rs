@@ -40,9 +40,7 @@ pub unsafe extern "C" fn n3p_parker_new(
             Parker::new(vehicle)?
         } else {
             // SAFETY: the caller's word.
-            let method: Method = unsafe { read_text(options.method, "options.method") }?
-                .parse()
-                .map_err(|e| Failure::bad_input(format!("options.method: {e}")))?;
+            let method = method(unsafe { read_text(options.method, "options.method") }?)?;
             vehicle.validate().map_err(n3p::ParkerError::from)?;
             let models = Models::compiled_in(&vehicle).map_err(n3p::ParkerError::from)?;
             Parker::by(method, vehicle, models)?
@@ -50,6 +48,22 @@ pub unsafe extern "C" fn n3p_parker_new(
         let made = made.margin(options.margin)?.allow_contact(options.allow_contact)?;
         parker.put(PARKERS.open(made.budget(options.budget()?)));
         Ok(())
+    })
+}
+
+/// The method of this name that can be planned by: all but policies, for which there is no engine.
+fn method(name: &str) -> Result<Method> {
+    let methods = || Method::all().filter(|method| !method.is_policy());
+    methods().find(|method| method.name() == name).ok_or_else(|| {
+        let what = match name.parse::<Method>() {
+            Ok(policy) => format!("{policy} is a policy, which this library cannot drive"),
+            Err(_) => format!("unknown method {name:?}"),
+        };
+        let expected: Vec<_> = methods().map(Method::name).collect();
+        Failure::bad_input(format!(
+            "options.method: {what}; expected one of {}",
+            expected.join(", ")
+        ))
     })
 }
 
@@ -69,9 +83,11 @@ pub unsafe extern "C" fn n3p_parker_plan(
     lot: *const n3p_lot,
     plan: *mut *mut n3p_plan,
 ) -> n3p_status {
-    let request = || Ok(Request::new(start.into(), goal.into()));
+    let planned = |parker: &Parker| {
+        Ok(parker.plan_request(&Request::new(start.into(), goal.into()), &*held(lot, "lot")?)?)
+    };
     // SAFETY: the caller's word.
-    unsafe { plan_in(parker, request, lot, plan) }
+    unsafe { plan_by(parker, planned, plan) }
 }
 
 /// Plans a request, which may have several goals, a tolerance and a parking type, among what stands
@@ -83,33 +99,14 @@ pub unsafe extern "C" fn n3p_parker_plan_request(
     lot: *const n3p_lot,
     plan: *mut *mut n3p_plan,
 ) -> n3p_status {
-    // SAFETY: the caller's word.
-    let request = || unsafe { to_request(&read(request, "request")?) };
-    // SAFETY: the caller's word.
-    unsafe { plan_in(parker, request, lot, plan) }
-}
-
-/// Plans what `request` comes to.
-///
-/// # Safety
-///
-/// Where it is neither NULL nor misaligned, `plan` leads to room for a handle.
-unsafe fn plan_in(
-    parker: *const n3p_parker,
-    request: impl FnOnce() -> Result<Request>,
-    lot: *const n3p_lot,
-    plan: *mut *mut n3p_plan,
-) -> n3p_status {
-    guarded(|| {
-        // SAFETY: the caller's word.
-        let plan = unsafe { Place::new(plan, "plan") }?;
-        plan.put(ptr::null_mut());
-        let parker = PARKERS.get(parker, "parker")?;
+    let planned = |parker: &Parker| {
         let lot = held(lot, "lot")?;
-        let planned = parker.plan_request(&request()?, &lot)?;
-        plan.put(PLANS.open(Kept::new(planned)));
-        Ok(())
-    })
+        // SAFETY: the caller's word.
+        let request = unsafe { to_request(&read(request, "request")?) }?;
+        Ok(parker.plan_request(&request, &lot)?)
+    };
+    // SAFETY: the caller's word.
+    unsafe { plan_by(parker, planned, plan) }
 }
 
 /// Plans a scene, whose vehicle must be the parker's. `plan` as in n3p_parker_plan.
@@ -119,13 +116,27 @@ pub unsafe extern "C" fn n3p_parker_plan_scene(
     scene: *const n3p_scene,
     plan: *mut *mut n3p_plan,
 ) -> n3p_status {
+    let planned = |parker: &Parker| Ok(parker.plan_scene(SCENES.get(scene, "scene")?.as_ref())?);
+    // SAFETY: the caller's word.
+    unsafe { plan_by(parker, planned, plan) }
+}
+
+/// Puts what `planned` comes to into `plan`.
+///
+/// # Safety
+///
+/// Where it is neither NULL nor misaligned, `plan` leads to room for a handle.
+unsafe fn plan_by(
+    parker: *const n3p_parker,
+    planned: impl FnOnce(&Parker) -> Result<Plan>,
+    plan: *mut *mut n3p_plan,
+) -> n3p_status {
     guarded(|| {
         // SAFETY: the caller's word.
         let plan = unsafe { Place::new(plan, "plan") }?;
         plan.put(ptr::null_mut());
         let parker = PARKERS.get(parker, "parker")?;
-        let planned = parker.plan_scene(SCENES.get(scene, "scene")?.as_ref())?;
-        plan.put(PLANS.open(Kept::new(planned)));
+        plan.put(PLANS.open(Kept::new(planned(&parker)?)));
         Ok(())
     })
 }
@@ -242,7 +253,8 @@ unsafe fn planned(
 
 /// # Safety
 ///
-/// Where they are neither NULL nor misaligned, the request's goals lead to as many poses as it says.
+/// Where they are neither NULL nor misaligned, the request's goals lead to as many poses as it says,
+/// which nobody changes meanwhile.
 unsafe fn to_request(request: &n3p_request) -> Result<Request> {
     let count = request.goal_count;
     if !(1..=Scene::MAX_GOALS).contains(&count) {

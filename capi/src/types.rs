@@ -5,7 +5,6 @@ use n3p::curves::TrajectoryLimits;
 use n3p::curves::trajectory::Moment;
 use n3p::geometry::Pose;
 use n3p::planners::{Budget, Effort};
-use n3p::vehicle::Gear;
 use n3p::world::ParkingType;
 use std::ffi::c_char;
 
@@ -317,14 +316,7 @@ impl From<&Moment> for n3p_moment {
             steer: m.steer,
             curvature: m.curvature,
             distance: m.distance,
-            gear: gear_number(m.gear),
+            gear: m.gear.sign() as i32,
         }
-    }
-}
-
-fn gear_number(gear: Gear) -> i32 {
-    match gear {
-        Gear::Forward => 1,
-        Gear::Backward => -1,
     }
 }

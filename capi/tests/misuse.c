@@ -77,7 +77,7 @@ static void parkers(void) {
     options.method = "\xff\xfe";
     BAD(n3p_parker_new(&car, &options, &parker), "UTF-8");
     options.method = "rl-eval";
-    BAD(n3p_parker_new(&car, &options, &parker), "rl-eval");
+    BAD(n3p_parker_new(&car, &options, &parker), "rl-eval is a policy");
     options.method = NULL;
     options.margin = NAN;
     BAD(n3p_parker_new(&car, &options, &parker), "margin is NaN");
