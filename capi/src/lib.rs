@@ -11,8 +11,16 @@
 //! - [`lot`], [`scene`], [`parker`], [`plan`]: the functions
 
 #![warn(missing_docs)]
-#![allow(non_camel_case_types, reason = "named as in C")]
-#![allow(clippy::missing_safety_doc, reason = "docs/c.md says once what pointers must be")]
+#![expect(non_camel_case_types, reason = "named as in C, in every module that has some")]
+
+/// What a function asks for of the pointers that it is given, beside what it checks ([`memory`]).
+/// As a macro, which cbindgen passes over, it stays out of the header: there and in docs/c.md the
+/// general rules are said in the words of C.
+macro_rules! safety {
+    ($asked:literal) => {
+        concat!("\n\n# Safety\n\nWhere they are neither NULL nor misaligned: ", $asked)
+    };
+}
 
 pub mod handles;
 pub mod lot;

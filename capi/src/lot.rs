@@ -62,10 +62,11 @@ unsafe fn read_outline<'a>(xy: *const f64, count: usize) -> Result<&'a [[f64; 2]
 }
 
 /// Makes an empty lot, to be freed by n3p_lot_free.
+#[doc = safety!("`lot` leads to room for a handle.")]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn n3p_lot_new(lot: *mut *mut n3p_lot) -> n3p_status {
     guarded(|| {
-        // SAFETY: the caller's word.
+        // SAFETY: what this function asks for.
         let lot = unsafe { Place::new(lot, "lot") }?;
         lot.put(LOTS.open(Mutex::default()));
         Ok(())
@@ -91,6 +92,7 @@ pub extern "C" fn n3p_lot_clear(lot: *mut n3p_lot) -> n3p_status {
 
 /// Adds a solid simple polygon, closed implicitly, its vertices in either direction; two vertices
 /// are a wall. `xy` holds x and y of each vertex in turn, 2 `count` numbers.
+#[doc = safety!("`xy` leads to 2 `count` numbers, which nobody changes meanwhile.")]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn n3p_lot_polygon(
     lot: *mut n3p_lot,
@@ -98,13 +100,14 @@ pub unsafe extern "C" fn n3p_lot_polygon(
     count: usize,
 ) -> n3p_status {
     guarded(|| {
-        // SAFETY: the caller's word.
+        // SAFETY: what this function asks for.
         let vertices = unsafe { read_outline(xy, count) }?;
         change(lot, |lot| lot.polygon(vertices))
     })
 }
 
 /// Adds a line without thickness, such as a kerb or a fence; `xy` as in n3p_lot_polygon.
+#[doc = safety!("`xy` leads to 2 `count` numbers, which nobody changes meanwhile.")]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn n3p_lot_polyline(
     lot: *mut n3p_lot,
@@ -112,13 +115,14 @@ pub unsafe extern "C" fn n3p_lot_polyline(
     count: usize,
 ) -> n3p_status {
     guarded(|| {
-        // SAFETY: the caller's word.
+        // SAFETY: what this function asks for.
         let vertices = unsafe { read_outline(xy, count) }?;
         change(lot, |lot| lot.polyline(vertices))
     })
 }
 
 /// Adds points, as a range sensor sees them; `xy` as in n3p_lot_polygon.
+#[doc = safety!("`xy` leads to 2 `count` numbers, which nobody changes meanwhile.")]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn n3p_lot_points(
     lot: *mut n3p_lot,
@@ -126,7 +130,7 @@ pub unsafe extern "C" fn n3p_lot_points(
     count: usize,
 ) -> n3p_status {
     guarded(|| {
-        // SAFETY: the caller's word.
+        // SAFETY: what this function asks for.
         let points = unsafe { read_points(xy, count) }?;
         change(lot, |lot| lot.points(points.iter().copied()))
     })
@@ -155,6 +159,7 @@ pub extern "C" fn n3p_lot_bounds(
 /// Adds the occupied cells of a grid, those that are not 0. `cells` holds `rows` rows of `columns`
 /// cells, the row of the lowest y first; (`x`, `y`) is the corner of the first cell with the lowest
 /// x and y, and `resolution` the side of a cell, metres.
+#[doc = safety!("`cells` leads to `columns` times `rows` bytes, which nobody changes meanwhile.")]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn n3p_lot_grid(
     lot: *mut n3p_lot,
@@ -178,7 +183,7 @@ pub unsafe extern "C" fn n3p_lot_grid(
             );
             return Err(Failure::bad_input(text));
         }
-        // SAFETY: the caller's word.
+        // SAFETY: what this function asks for.
         let cells = unsafe { read_all(cells, count, "cells") }?;
         let occupied: Vec<bool> = cells.iter().map(|&cell| cell != 0).collect();
         change(lot, |lot| lot.grid([x, y], resolution, columns, &occupied))

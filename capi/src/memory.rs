@@ -65,8 +65,9 @@ pub(crate) unsafe fn read_all<'a, T: Copy>(
         let text = format!("{argument} has a count of {count}; expected at most {most}");
         return Err(Failure::bad_input(text));
     }
-    // SAFETY: neither NULL nor misaligned, and no more than the caller gives his word for. Values
-    // of 24 bytes at most do not come near to `isize::MAX` bytes.
+    const { assert!(N3P_MAX_COUNT * size_of::<T>() <= isize::MAX as usize) };
+    // SAFETY: neither NULL nor misaligned, no more than the caller gives his word for, and no more
+    // than a slice may have.
     Ok(unsafe { slice::from_raw_parts(pointer, count) })
 }
 

@@ -22,6 +22,10 @@ static PARKERS: Table<Parker> = Table::new("n3p_parker", 3);
 
 /// Makes a parker for a vehicle, with the models that are compiled in; to be freed by
 /// n3p_parker_free. NULL options are the defaults.
+#[doc = safety!(
+    "`vehicle` and `options` lead to such structs, `options.method` to text that ends with a NUL, and \
+     nobody changes these meanwhile; `parker` leads to room for a handle apart from them."
+)]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn n3p_parker_new(
     vehicle: *const n3p_vehicle,
@@ -29,17 +33,17 @@ pub unsafe extern "C" fn n3p_parker_new(
     parker: *mut *mut n3p_parker,
 ) -> n3p_status {
     guarded(|| {
-        // SAFETY: the caller's word.
+        // SAFETY: what this function asks for.
         let parker = unsafe { Place::new(parker, "parker") }?;
         parker.put(ptr::null_mut());
-        // SAFETY: the caller's word.
+        // SAFETY: what this function asks for.
         let vehicle = unsafe { read(vehicle, "vehicle") }?.into();
-        // SAFETY: the caller's word.
+        // SAFETY: what this function asks for.
         let options = unsafe { read_or(options, "options", n3p_options::DEFAULT) }?;
         let made = if options.method.is_null() {
             Parker::new(vehicle)?
         } else {
-            // SAFETY: the caller's word.
+            // SAFETY: what this function asks for.
             let method = method(unsafe { read_text(options.method, "options.method") }?)?;
             vehicle.validate().map_err(n3p::ParkerError::from)?;
             let models = Models::compiled_in(&vehicle).map_err(n3p::ParkerError::from)?;
@@ -75,6 +79,7 @@ pub extern "C" fn n3p_parker_free(parker: *mut n3p_parker) -> n3p_status {
 
 /// Plans from `start` to `goal` among what stands in `lot`. `plan` is to be freed by n3p_plan_free;
 /// it is NULL unless the function returns N3P_OK.
+#[doc = safety!("`plan` leads to room for a handle.")]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn n3p_parker_plan(
     parker: *const n3p_parker,
@@ -86,12 +91,16 @@ pub unsafe extern "C" fn n3p_parker_plan(
     let planned = |parker: &Parker| {
         Ok(parker.plan_request(&Request::new(start.into(), goal.into()), &*held(lot, "lot")?)?)
     };
-    // SAFETY: the caller's word.
+    // SAFETY: what this function asks for.
     unsafe { plan_by(parker, planned, plan) }
 }
 
 /// Plans a request, which may have several goals, a tolerance and a parking type, among what stands
 /// in `lot`. `plan` as in n3p_parker_plan.
+#[doc = safety!(
+    "`request` leads to such a struct and its `goals` to `goal_count` poses, which nobody changes \
+     meanwhile; `plan` leads to room for a handle apart from them."
+)]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn n3p_parker_plan_request(
     parker: *const n3p_parker,
@@ -101,15 +110,16 @@ pub unsafe extern "C" fn n3p_parker_plan_request(
 ) -> n3p_status {
     let planned = |parker: &Parker| {
         let lot = held(lot, "lot")?;
-        // SAFETY: the caller's word.
+        // SAFETY: what this function asks for.
         let request = unsafe { to_request(&read(request, "request")?) }?;
         Ok(parker.plan_request(&request, &lot)?)
     };
-    // SAFETY: the caller's word.
+    // SAFETY: what this function asks for.
     unsafe { plan_by(parker, planned, plan) }
 }
 
 /// Plans a scene, whose vehicle must be the parker's. `plan` as in n3p_parker_plan.
+#[doc = safety!("`plan` leads to room for a handle.")]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn n3p_parker_plan_scene(
     parker: *const n3p_parker,
@@ -117,7 +127,7 @@ pub unsafe extern "C" fn n3p_parker_plan_scene(
     plan: *mut *mut n3p_plan,
 ) -> n3p_status {
     let planned = |parker: &Parker| Ok(parker.plan_scene(SCENES.get(scene, "scene")?.as_ref())?);
-    // SAFETY: the caller's word.
+    // SAFETY: what this function asks for.
     unsafe { plan_by(parker, planned, plan) }
 }
 
@@ -148,6 +158,11 @@ unsafe fn plan_by(
 /// Returns N3P_OK where all have plans, and else the status of the first that has none, which the
 /// message is about. Where an argument cannot be used nothing is planned: all plans are NULL, and
 /// all statuses are what is returned.
+#[doc = safety!(
+    "`requests` and `lots` lead to `count` values each, every request's `goals` to its `goal_count` \
+     poses, and nobody changes these meanwhile; `plans` and `statuses` lead to room for `count` \
+     values each, apart from them and from each other."
+)]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn n3p_parker_plan_batch(
     parker: *const n3p_parker,
@@ -157,7 +172,7 @@ pub unsafe extern "C" fn n3p_parker_plan_batch(
     plans: *mut *mut n3p_plan,
     statuses: *mut n3p_status,
 ) -> n3p_status {
-    // SAFETY: the caller's word.
+    // SAFETY: what this function asks for.
     let (plans, statuses) = match unsafe { places(plans, statuses, count) } {
         Ok(places) => places,
         Err(failure) => return guarded(|| Err(failure)),
@@ -173,7 +188,7 @@ pub unsafe extern "C" fn n3p_parker_plan_batch(
     let mut results = Vec::new();
     let status = guarded(|| {
         let parker = PARKERS.get(parker, "parker")?;
-        // SAFETY: the caller's word.
+        // SAFETY: what this function asks for.
         results = unsafe { planned(&parker, requests, lots, count) }?;
         Ok(())
     });

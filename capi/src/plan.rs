@@ -61,13 +61,14 @@ pub extern "C" fn n3p_plan_free(plan: *mut n3p_plan) -> n3p_status {
 }
 
 /// What the plan came to.
+#[doc = safety!("`summary` leads to room for such a struct.")]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn n3p_plan_summary(
     plan: *const n3p_plan,
     summary: *mut n3p_summary,
 ) -> n3p_status {
     guarded(|| {
-        // SAFETY: the caller's word.
+        // SAFETY: what this function asks for.
         let summary = unsafe { Place::new(summary, "summary") }?;
         let plan = &PLANS.get(plan, "plan")?.plan;
         summary.put(n3p_summary {
@@ -88,6 +89,9 @@ pub unsafe extern "C" fn n3p_plan_summary(
 /// first the start. `count` becomes their number; where that is more than `capacity`, nothing else
 /// is written and the function returns N3P_BUFFER_TOO_SMALL. NULL with a capacity of 0 asks for the
 /// number alone.
+#[doc = safety!(
+    "`buffer` leads to room for `capacity` poses, and `count` to room for a number apart from them."
+)]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn n3p_plan_poses(
     plan: *const n3p_plan,
@@ -102,13 +106,17 @@ pub unsafe extern "C" fn n3p_plan_poses(
             let [x, y, heading] = file.poses[i];
             n3p_path_pose { x, y, heading, steer: file.steer[i], gear: file.gears[i].into() }
         });
-        // SAFETY: the caller's word.
+        // SAFETY: what this function asks for.
         unsafe { fill(poses, buffer, capacity, count) }
     })
 }
 
 /// Writes the path in time to `buffer`, as n3p_plan_poses does: moments 0.05 s apart, and the end.
 /// NULL limits are those of n3p_limits_default.
+#[doc = safety!(
+    "`limits` leads to such a struct, which nobody changes meanwhile; `buffer` leads to room for \
+     `capacity` moments, and `count` to room for a number, apart from it and from each other."
+)]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn n3p_plan_trajectory(
     plan: *const n3p_plan,
@@ -119,10 +127,10 @@ pub unsafe extern "C" fn n3p_plan_trajectory(
 ) -> n3p_status {
     guarded(|| {
         let plan = PLANS.get(plan, "plan")?;
-        // SAFETY: the caller's word.
+        // SAFETY: what this function asks for.
         let limits = unsafe { read_or(limits, "limits", n3p_limits_default()) }?;
         let driven = plan.driven(&limits.into())?;
-        // SAFETY: the caller's word.
+        // SAFETY: what this function asks for.
         unsafe { fill(driven.moments.iter().map(n3p_moment::from), buffer, capacity, count) }
     })
 }
@@ -130,6 +138,9 @@ pub unsafe extern "C" fn n3p_plan_trajectory(
 /// Writes the path to `buffer` as the JSON of path files (docs/formats.md), byte by byte what
 /// n3p-plan --out writes, and a NUL. `length` becomes the number of bytes without the NUL: the
 /// buffer needs a capacity of one more. Otherwise as n3p_plan_poses.
+#[doc = safety!(
+    "`buffer` leads to room for `capacity` bytes, and `length` to room for a number apart from them."
+)]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn n3p_plan_json(
     plan: *const n3p_plan,
@@ -138,13 +149,13 @@ pub unsafe extern "C" fn n3p_plan_json(
     length: *mut usize,
 ) -> n3p_status {
     guarded(|| {
-        // SAFETY: the caller's word.
+        // SAFETY: what this function asks for.
         let place = unsafe { Place::new(length, "length") }?;
         let plan = PLANS.get(plan, "plan")?;
         let text = plan.json().to_bytes_with_nul();
         let mut with_nul = 0;
         place.put(text.len() - 1);
-        // SAFETY: the caller's word for `buffer`.
+        // SAFETY: what this function asks for of `buffer`.
         unsafe { fill(text.iter().map(|&b| b as c_char), buffer, capacity, &mut with_nul) }
     })
 }

@@ -17,13 +17,17 @@ pub(crate) static SCENES: Table<Scene> = Table::new("n3p_scene", 2);
 
 /// Reads a scene from a file, `.json` (docs/formats.md) or `.csv` (TPCAP); to be freed by
 /// n3p_scene_free.
+#[doc = safety!(
+    "`file` leads to text that ends with a NUL and that nobody changes meanwhile; `scene` leads to \
+     room for a handle apart from it."
+)]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn n3p_scene_read(
     file: *const c_char,
     scene: *mut *mut n3p_scene,
 ) -> n3p_status {
     guarded(|| {
-        // SAFETY: the caller's word.
+        // SAFETY: what this function asks for.
         let (file, scene) = unsafe { (read_text(file, "file"), Place::new(scene, "scene")?) };
         scene.put(std::ptr::null_mut());
         let read = Scene::read(Path::new(file?)).map_err(|e| Failure::bad_input(e.to_string()))?;
@@ -33,6 +37,10 @@ pub unsafe extern "C" fn n3p_scene_read(
 }
 
 /// Reads a scene from `length` bytes of JSON (docs/formats.md); to be freed by n3p_scene_free.
+#[doc = safety!(
+    "`json` leads to `length` bytes, which nobody changes meanwhile; `scene` leads to room for a \
+     handle apart from them."
+)]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn n3p_scene_from_json(
     json: *const c_char,
@@ -40,7 +48,7 @@ pub unsafe extern "C" fn n3p_scene_from_json(
     scene: *mut *mut n3p_scene,
 ) -> n3p_status {
     guarded(|| {
-        // SAFETY: the caller's word.
+        // SAFETY: what this function asks for.
         let (json, scene) =
             unsafe { (read_all(json.cast::<u8>(), length, "json"), Place::new(scene, "scene")?) };
         scene.put(std::ptr::null_mut());
@@ -60,13 +68,14 @@ pub extern "C" fn n3p_scene_free(scene: *mut n3p_scene) -> n3p_status {
 }
 
 /// The scene's vehicle, for which a parker must be made to plan it.
+#[doc = safety!("`vehicle` leads to room for such a struct.")]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn n3p_scene_vehicle(
     scene: *const n3p_scene,
     vehicle: *mut n3p_vehicle,
 ) -> n3p_status {
     guarded(|| {
-        // SAFETY: the caller's word.
+        // SAFETY: what this function asks for.
         let vehicle = unsafe { Place::new(vehicle, "vehicle") }?;
         vehicle.put(SCENES.get(scene, "scene")?.vehicle.into());
         Ok(())
