@@ -1,11 +1,28 @@
-// Plans from polygons, asks for the path in time, and measures a warm plan.
+// Plans from polygons, asks for the path in time, and measures a parker and a warm plan.
 #include "n3p.hpp"
 
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
 
+// What `work` takes, microseconds: the median, since other programs disturb.
+template <typename Work> double median(size_t runs, Work work) {
+    std::vector<double> times;
+    for (size_t i = 0; i < runs; i++) {
+        const auto before = std::chrono::steady_clock::now();
+        work();
+        const auto after = std::chrono::steady_clock::now();
+        times.push_back(std::chrono::duration<double, std::micro>(after - before).count());
+    }
+    std::nth_element(times.begin(), times.begin() + runs / 2, times.end());
+    return times[runs / 2];
+}
+
 int main() try {
+    // The first one of a program finds less prepared.
+    const auto make = [] { n3p::make_parker(n3p_vehicle_default()); };
+    const double first = median(1, make);
+    std::printf("a parker: %.2f ms, the first one %.2f ms\n", median(50, make) / 1e3, first / 1e3);
     const n3p::Parker parker = n3p::make_parker(n3p_vehicle_default());
 
     // Two parked cars, a bay between them, and the kerb across the lane; metres.
@@ -34,16 +51,8 @@ int main() try {
     n3p::check(n3p_plan_trajectory(plan.get(), &limits, moments.data(), moments.size(), &count));
     std::printf("%.1f s of driving in %zu moments\n", moments[count - 1].time, count);
 
-    // Once more, warm: the median, since other programs disturb.
-    std::vector<double> times;
-    for (int i = 0; i < 2000; i++) {
-        const auto before = std::chrono::steady_clock::now();
-        const n3p::Plan again = n3p::plan(parker, start, goal, lot);
-        const auto after = std::chrono::steady_clock::now();
-        times.push_back(std::chrono::duration<double, std::micro>(after - before).count());
-    }
-    std::nth_element(times.begin(), times.begin() + 1000, times.end());
-    std::printf("a warm plan: %.1f us\n", times[1000]);
+    const double warm = median(2000, [&] { n3p::plan(parker, start, goal, lot); });
+    std::printf("a warm plan: %.1f us\n", warm);
 
     // What cannot be planned is said in words.
     const n3p_pose within = {2.0, 0.0, 0.0};
