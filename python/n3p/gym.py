@@ -50,7 +50,34 @@ def _action_space() -> Box:
     return Box(-1.0, 1.0, (2,), np.float32)
 
 
-class ParkingEnv(gymnasium.Env):
+class _Parking:
+    """What one car and many have in common: environments in Rust, which may be closed and seeded."""
+
+    np_random: np.random.Generator
+
+    def _set_up(self, count: int, render_mode: None, **settings: Any) -> None:
+        if render_mode is not None:
+            raise BadInput(f"render_mode: is {render_mode!r}; expected None")
+        self._environments: Environments | None = Environments(count, **settings)
+        self._seeded = False
+
+    def _open(self) -> Environments:
+        if self._environments is None:
+            raise ClosedEnvironmentError("the environment was closed; make another one")
+        return self._environments
+
+    def _own_seed(self, seed: int | None) -> int | None:
+        """What the environments begin anew with, once Gymnasium has heard `seed`; None to go on."""
+        begins = seed is not None or not self._seeded
+        self._seeded = True
+        # Drawn, not taken as it is: scenes of small seeds are those that are evaluated.
+        return int(self.np_random.integers(2**63)) if begins else None
+
+    def _close(self) -> None:
+        self._environments = None
+
+
+class ParkingEnv(_Parking, gymnasium.Env):
     """One car that parks.
 
     Observations are a dict of float32 arrays: ``lidar`` (120,) metres, ``target`` (5,) metres and
@@ -93,13 +120,9 @@ class ParkingEnv(gymnasium.Env):
         reward_scale: float = 0.1,
         render_mode: None = None,
     ) -> None:
-        if render_mode is not None:
-            raise BadInput(f"render_mode: is {render_mode!r}; expected None")
-        self.render_mode = None
-        self.observation_space = _observation_space()
-        self.action_space = _action_space()
-        self._environments: Environments | None = Environments(
+        self._set_up(
             1,
+            render_mode,
             course=course,
             type=type,
             level=level,
@@ -108,23 +131,15 @@ class ParkingEnv(gymnasium.Env):
             horizon=horizon,
             reward_scale=reward_scale,
         )
-        self._seeded = False
-
-    def _open(self) -> Environments:
-        if self._environments is None:
-            raise ClosedEnvironmentError("the environment was closed; make another one")
-        return self._environments
+        self.observation_space = _observation_space()
+        self.action_space = _action_space()
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         """Begins the next episode; with a seed, the first of that seed."""
         super().reset(seed=seed)
-        first = seed is not None or not self._seeded
-        # Drawn, not taken as it is: scenes of small seeds are those that are evaluated.
-        own = int(self.np_random.integers(2**63)) if first else None
-        self._seeded = True
-        observation = _single(self._open().reset(own))
+        observation = _single(self._open().reset(self._own_seed(seed)))
         return observation, {"mask": observation["mask"], "scripted": False}
 
     def step(
@@ -143,10 +158,10 @@ class ParkingEnv(gymnasium.Env):
 
     def close(self) -> None:
         """Ends it: it can do nothing more."""
-        self._environments = None
+        self._close()
 
 
-class ParkingVectorEnv(VectorEnv):
+class ParkingVectorEnv(_Parking, VectorEnv):
     """Many cars that park, each in its own scene, stepped in Rust by all cores.
 
     As `ParkingEnv`, with a first dimension more everywhere: actions are (num_envs, 2). An episode
@@ -177,15 +192,13 @@ class ParkingVectorEnv(VectorEnv):
         autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
         render_mode: None = None,
     ) -> None:
-        if render_mode is not None:
-            raise BadInput(f"render_mode: is {render_mode!r}; expected None")
         if autoreset_mode not in (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP):
             raise BadInput(
                 f"autoreset_mode: is {autoreset_mode!r}; expected AutoresetMode.NEXT_STEP or SAME_STEP"
             )
-        self.metadata = {"render_modes": [], "autoreset_mode": autoreset_mode}
-        self._environments: Environments | None = Environments(
+        self._set_up(
             num_envs,
+            render_mode,
             course=course,
             type=type,
             level=level,
@@ -195,19 +208,13 @@ class ParkingVectorEnv(VectorEnv):
             reward_scale=reward_scale,
             autoreset="same_step" if autoreset_mode is AutoresetMode.SAME_STEP else "next_step",
         )
+        self.metadata = {"render_modes": [], "autoreset_mode": autoreset_mode}
         self.num_envs = num_envs
-        self.render_mode = None
         self.single_observation_space = _observation_space()
         self.single_action_space = _action_space()
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._all = np.ones(num_envs, np.bool_)
-        self._seeded = False
-
-    def _open(self) -> Environments:
-        if self._environments is None:
-            raise ClosedEnvironmentError("the environments were closed; make others")
-        return self._environments
 
     def _infos(self, **values: Any) -> dict[str, Any]:
         """Infos that every environment has."""
@@ -221,13 +228,10 @@ class ParkingVectorEnv(VectorEnv):
         ``options={"reset_mask": mask}``, bool (num_envs,), begins only those that are True.
         """
         super().reset(seed=seed)
-        first = seed is not None or not self._seeded
-        own = int(self.np_random.integers(2**63)) if first else None
-        self._seeded = True
         mask = (options or {}).get("reset_mask")
         if mask is not None:
             mask = np.asarray(mask, np.bool_).ravel().tolist()
-        observation = _dict(self._open().reset(own, mask))
+        observation = _dict(self._open().reset(self._own_seed(seed), mask))
         return observation, self._infos(
             mask=observation["mask"], scripted=np.zeros(self.num_envs, np.bool_)
         )
@@ -252,7 +256,7 @@ class ParkingVectorEnv(VectorEnv):
 
     def close_extras(self, **kwargs: Any) -> None:
         """Ends all: they can do nothing more."""
-        self._environments = None
+        self._close()
 
 
 def _dict(seen: tuple[NDArray[Any], ...]) -> dict[str, NDArray[Any]]:

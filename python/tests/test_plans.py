@@ -93,7 +93,9 @@ def test_a_trajectory_is_columns(parker):
 def within(rows, offset, stride):
     """The rows as a view that begins `offset` bytes into a buffer and takes `stride` for a row."""
     rows = np.array(rows)
-    view = np.ndarray(rows.shape, float, bytearray(offset + stride * len(rows)), offset, (stride, 8))
+    view = np.ndarray(
+        rows.shape, float, bytearray(offset + stride * len(rows)), offset, (stride, 8)
+    )
     view[:] = rows
     return view
 
@@ -123,7 +125,9 @@ def among_records(rows):
         lambda rows: within(rows, 0, 28),
         lambda rows: within(rows, 1, 32),
         lambda rows: within(rows, 4, 28)[::-1][::-1],
-        lambda rows: np.frombuffer(b"?" + np.array(rows).tobytes(), offset=1).reshape(len(rows), -1),
+        lambda rows: np.frombuffer(b"?" + np.array(rows).tobytes(), offset=1).reshape(
+            len(rows), -1
+        ),
     ],
 )
 def test_numbers_may_come_in_any_form(parker, form):
