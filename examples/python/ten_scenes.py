@@ -15,10 +15,11 @@ import n3p
 
 def main(listing="examples/ten-scenes.txt", folder=None):
     parkers = {}
-    for name in Path(listing).read_text().split():
+    for name in Path(listing).read_text().splitlines():
         scene = n3p.load_scene(name)
-        vehicle = scene.vehicle
-        parker = parkers.setdefault(str(vehicle), n3p.Parker(vehicle=vehicle))
+        if scene.vehicle not in parkers:
+            parkers[scene.vehicle] = n3p.Parker(vehicle=scene.vehicle)
+        parker = parkers[scene.vehicle]
         plan = parker.plan_scene(scene)
         fastest = float("inf")
         for _ in range(100):
