@@ -68,7 +68,7 @@ def test_a_scene_of_arguments_plans_the_same(parker):
 
 
 # Of the files of `cargo run --example export_scenes -- DIR 3 5`, in the order of their names.
-EXPORTED = "b1248e208b67fa8b927065a7637a816d3f263a9438a016e5e58a20555f35d777"
+EXPORTED = "28d84569d624bbd65571570947998f884b9b8dd654b576f5bccbe722e35f8fd8"
 
 
 def test_generated_scenes_are_those_of_rust():
