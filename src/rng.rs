@@ -39,6 +39,8 @@ pub enum Stream {
     Clutter = 13,
     /// An unusual bay.
     Bay = 14,
+    /// A world to learn manoeuvres in.
+    World = 20,
 }
 
 /// The generator of `(seed, stream, index)`.

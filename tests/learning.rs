@@ -104,7 +104,7 @@ fn samples(kind: ParkingType, cells: &[usize], per_cell: usize, seed: u64) -> Ve
 
 fn knn_of(samples: &[Sample], kinds: &[ParkingType], dir: &Path) -> KnnSelector {
     let path = dir.join("knn.bin");
-    training::knn::train(&metadata(), samples, kinds, &path).unwrap();
+    training::knn::train(&metadata(), samples, kinds, &KnnConfig { worlds: 0, seed: 1 }, &path).unwrap();
     KnnSelector::load(&path).unwrap()
 }
 

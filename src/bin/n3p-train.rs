@@ -9,6 +9,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::environment::courses::{Course, Stratum};
 use n3p::lab::dataset::Dataset;
+use n3p::lab::training::knn::KnnConfig;
 use n3p::lab::training::quality::{Errors, Reach};
 use n3p::lab::training::rl::{Begin, RlConfig};
 use n3p::lab::training::{self, MlpConfig, TrainingError};
@@ -79,6 +80,12 @@ struct KnnArgs {
     /// Model file
     #[arg(long, value_name = "FILE", default_value = "models/knn.bin")]
     out: PathBuf,
+    /// Generated worlds of each type in which manoeuvres are learnt, too; 0 for none
+    #[arg(long, value_name = "N", default_value_t = KnnConfig::default().worlds)]
+    worlds: u32,
+    /// Seed of the worlds
+    #[arg(long, value_name = "S", default_value_t = KnnConfig::default().seed)]
+    seed: u64,
 }
 
 #[derive(Args)]
@@ -196,10 +203,12 @@ fn mlp_config(file: Option<&Path>, seed: Option<u64>) -> anyhow::Result<MlpConfi
 }
 
 fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
+    let config = KnnConfig { worlds: args.worlds, seed: args.seed };
+    config.validate().or_bad_input()?;
     artefact::check_writable(&args.out).or_bad_input()?;
     let (data, kinds) = read(&args.common)?;
     let begin = Instant::now();
-    let log = training::knn::train(&data.metadata, &data.samples, &kinds, &args.out)
+    let log = training::knn::train(&data.metadata, &data.samples, &kinds, &config, &args.out)
         .map_err(|e| exit_code(e, &args.common.data))?;
     for training::knn::KnnKindLog { kind, samples, occupied_cells, manoeuvres, .. } in &log.kinds {
         cli::print(format!(

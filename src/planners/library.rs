@@ -27,6 +27,9 @@ use super::joint;
 /// lock. Poses are looked at so far apart along it. Both for the default vehicle.
 const BESIDE: f64 = 0.4;
 const STRIDE: f64 = 0.25;
+/// Free manoeuvres tried for something cheaper than a plan, and by which share at least.
+const BETTER: usize = 10;
+const GAIN: f64 = 0.03;
 /// The cheapest rests of manoeuvres that are bent to begin at the start.
 const RESTS: usize = 12;
 
@@ -347,6 +350,11 @@ impl LookUp<'_> {
             }
         }
         None
+    }
+
+    /// The next plan that costs clearly less than one of this `cost`, if one of the next few does.
+    pub fn better(&mut self, cost: f64) -> Option<LibraryPlan> {
+        self.next(cost * (1.0 - GAIN), BETTER)
     }
 
     /// The first plan by one of the first `tries` manoeuvres that [`LookUp::next`] found free, whose

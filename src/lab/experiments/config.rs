@@ -10,6 +10,7 @@ use crate::lab::evaluation::SuiteConfig;
 use crate::lab::evaluation::suite::MAX_COUNT;
 use crate::lab::toml_file::{TomlError, read_toml};
 use crate::lab::training::MlpConfig;
+use crate::lab::training::knn::KnnConfig;
 use crate::lab::training::rl::RlConfig;
 use crate::n3p::RolloutConfig;
 use crate::n3p::guided::RankedConfig;
@@ -51,10 +52,12 @@ pub struct ExperimentConfig {
     pub evaluate: EvaluateConfig,
 }
 
-/// What is trained. KNN needs no settings.
+/// What is trained.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TrainConfig {
+    /// The KNN, as in `n3p-train knn`, without `seed`.
+    pub knn: KnnConfig,
     /// The networks, as in `n3p-train mlp --config`, without `seed`.
     pub mlp: MlpConfig,
     /// The policies, as in `n3p-train rl --config`, without `seed` and `vehicle`.
@@ -213,6 +216,7 @@ impl ExperimentConfig {
     fn resolved(mut self) -> Self {
         self.collect.vehicle = self.vehicle;
         self.collect.seed = self.seed;
+        self.train.knn.seed = self.seed;
         self.train.mlp.seed = self.seed;
         self.train.rl.seed = self.seed;
         self.train.rl.vehicle = self.vehicle;
@@ -232,6 +236,7 @@ impl ExperimentConfig {
         }
         self.vehicle.validate().map_err(|e| e.to_string())?;
         self.collect.validate().map_err(|e| format!("collect: {e}"))?;
+        self.train.knn.validate().map_err(|e| format!("train.knn: {e}"))?;
         self.train.mlp.validate().map_err(|e| format!("train.mlp: {e}"))?;
         if self.courses().next().is_some() {
             self.train.rl.validate().map_err(|e| format!("train.rl: {e}"))?;

@@ -24,7 +24,7 @@ pub(super) fn points(
     let part = subset.of(data);
     let kinds = &config.evaluate.types;
     let knn = folder.join("knn.bin");
-    training::knn::train(&part.metadata, &part.samples, kinds, &knn)?;
+    training::knn::train(&part.metadata, &part.samples, kinds, &config.train.knn, &knn)?;
     let mut files = vec![knn];
     if curve.needs_mlp() {
         for &kind in kinds {

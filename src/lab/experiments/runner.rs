@@ -187,7 +187,7 @@ pub fn run(
         runner.train_policies()?;
     }
     let rl = config.courses().next().map(|_| &config.train.rl);
-    let trained = settings((&data_id, &config.train.mlp, rl, &policies));
+    let trained = settings((&data_id, &config.train.knn, &config.train.mlp, rl, &policies));
     runner.evaluate(runner.ready()?, &trained, &curve)
 }
 
@@ -292,10 +292,11 @@ impl Runner<'_> {
         self.make_folder(self.path("models"))?;
         let kinds = &self.config.evaluate.types;
         let knn = self.model("knn.bin");
-        let knn_settings = settings(("knn", data));
+        let config = &self.config.train.knn;
+        let knn_settings = settings(("knn", data, config));
         if self.stages.begin("train-knn", &knn_settings, knn.exists())? != Todo::Nothing {
             let set = self.dataset(read)?;
-            training::knn::train(&set.metadata, &set.samples, kinds, &knn)?;
+            training::knn::train(&set.metadata, &set.samples, kinds, config, &knn)?;
             self.stages.finish("train-knn", &knn_settings)?;
         }
         if !self.config.needs_mlp() {

@@ -4,23 +4,51 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::worlds::Worlds;
 pub use super::leave_one_out::LeaveOneOut;
 use super::leave_one_out::leave_one_out;
 use super::library::{self, Source};
-use super::{TrainingError, card, solved, write_beside};
+use super::{TrainingError, card, settings, solved, write_beside};
 use crate::geometry::Pose;
 use crate::lab::dataset::{Metadata, Sample, content_sha256};
+use crate::lab::progress;
 use crate::selectors::artefact;
 use crate::selectors::knn_file::{self, KindHeader, KnnEntries, KnnEntry, KnnHeader};
 use crate::world::ParkingType;
+
+/// What is learnt beside the samples. Every setting may be left out of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct KnnConfig {
+    /// Generated worlds of each type in which manoeuvres are learnt, 0 to 10⁶; see `worlds`.
+    pub worlds: u32,
+    /// Seed of the worlds.
+    pub seed: u64,
+}
+
+impl Default for KnnConfig {
+    fn default() -> Self {
+        Self { worlds: 12_000, seed: 1 }
+    }
+}
+
+impl KnnConfig {
+    /// Checks every setting.
+    pub fn validate(&self) -> Result<(), TrainingError> {
+        let within = self.worlds <= 1_000_000;
+        settings::check("worlds", within, self.worlds.to_string(), "0 to 1000000")
+    }
+}
 
 /// What was stored; written as JSON beside the model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KnnLog {
     /// SHA-256 of the data set.
     pub data_sha256: String,
-    /// Seed of the data set; the training draws no random numbers.
+    /// Seed of the data set.
     pub seed: u64,
+    /// What was learnt beside the samples.
+    pub config: KnnConfig,
     /// Metres per radian of the metric's heading part; see [`crate::selectors::knn`].
     pub heading_radius: f64,
     /// Size of the file, bytes.
@@ -57,8 +85,10 @@ pub fn train(
     metadata: &Metadata,
     samples: &[Sample],
     kinds: &[ParkingType],
+    config: &KnnConfig,
     out: &Path,
 ) -> Result<KnnLog, TrainingError> {
+    config.validate()?;
     let mut known = Vec::new();
     for &kind in kinds {
         let solved = solved(samples, kind, metadata.grid.cell_count(kind))?;
@@ -68,14 +98,18 @@ pub fn train(
         known.push((kind, solved));
     }
     let heading_radius = metadata.vehicle.turning_radius() / 2.0;
+    let progress = progress::bar(2 * u64::from(config.worlds) * kinds.len() as u64, "worlds");
+    let worlds = Worlds { count: config.worlds, seed: config.seed, progress: &progress };
     let learnt: Vec<_> = std::thread::scope(|scope| {
         let learn = |(kind, solved): &(ParkingType, Vec<&Sample>)| {
-            let manoeuvres = library::condense(*kind, &[Source { metadata, solved, unit: 1.0 }]);
+            let sources = [Source { metadata, solved, unit: 1.0 }];
+            let manoeuvres = worlds.learn(*kind, library::condense(*kind, &sources), &sources);
             (manoeuvres, leave_one_out(metadata, solved, heading_radius))
         };
         let running: Vec<_> = known.iter().map(|k| scope.spawn(move || learn(k))).collect();
         running.into_iter().map(|r| r.join().expect("learning does not panic")).collect()
     });
+    progress.finish_and_clear();
     let mut headers = Vec::new();
     let mut entries = Vec::new();
     let mut logs = Vec::new();
@@ -116,7 +150,8 @@ pub fn train(
     let bytes = knn_file::encode(&header, &entries);
     artefact::write(out, &bytes)?;
     let (data_sha256, seed) = (header.data_sha256, header.seed);
-    let log = KnnLog { data_sha256, seed, heading_radius, bytes: bytes.len(), kinds: logs };
+    let config = *config;
+    let log = KnnLog { data_sha256, seed, config, heading_radius, bytes: bytes.len(), kinds: logs };
     write_beside(out, &log, card::knn(out, metadata, &log))?;
     Ok(log)
 }

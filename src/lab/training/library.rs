@@ -41,7 +41,7 @@ pub(super) struct Source<'a> {
 
 impl Source<'_> {
     /// The library of `manoeuvres` for this vehicle.
-    fn library(&self, manoeuvres: &[Vec<Segment>]) -> Library {
+    pub fn library(&self, manoeuvres: &[Vec<Segment>]) -> Library {
         let Metadata { vehicle, planner, .. } = self.metadata;
         let own: Vec<_> = manoeuvres.iter().map(|m| scaled(m, self.unit)).collect();
         Library::new(

@@ -12,12 +12,12 @@ use crate::world::cell::Grid;
 
 /// Libraries kept prepared: those of the parking types of two vehicles, or of one with two margins.
 const LIBRARIES: usize = 6;
+/// The first so many manoeuvres of a library, those of most use, are looked at for every plan, the others
+/// where these do not do as usual.
+const COMMON: usize = 400;
 /// Known manoeuvres, free in the scene, that `n3p` tries to join before it asks for the curve
 /// straight to the goal, and then once more for something cheaper: most plans take the first.
 const FIRST_TRIES: usize = 16;
-/// Those it tries for something cheaper than the best it found, and by which share at least.
-const BETTER: usize = 4;
-const GAIN: f64 = 0.1;
 /// A plan that costs at most so many times the estimate of the best known one (which knows nothing
 /// of joints and obstacles) or the least cost through empty space is taken as it is, unless it
 /// passes something near on its way.
@@ -41,6 +41,8 @@ pub(super) struct Prepared {
     /// From this number on its manoeuvres are none but the straight into the spot, or nothing at
     /// all: what joins them is the curve straight to the goal.
     straights: usize,
+    /// Manoeuvres that are rarely of use.
+    rare: Library,
 }
 
 /// A plan that took no search.
@@ -88,11 +90,38 @@ impl GuidedPlanner {
         }
         // What is estimated to cost less than the best so far may do so.
         while let Some(known) = &best
-            && let Some(better) = look_up.next(known.cost * (1.0 - GAIN), BETTER)
+            && let Some(better) = look_up.better(known.cost)
         {
             best = Some(by_manoeuvre(better));
         }
+        if best.as_ref().is_none_or(|known| known.cost > USUAL * known.least) {
+            best = self.rarely_of_use(problem, &cost, best, least);
+        }
         self.out_of_the_mouth(problem, &cost, best)
+    }
+
+    /// The best so far, or a plan by a manoeuvre that is rarely of use where that costs less.
+    fn rarely_of_use(
+        &mut self,
+        problem: &Problem,
+        model: &CostModel,
+        mut best: Option<Known>,
+        least: f64,
+    ) -> Option<Known> {
+        let Self { libraries, library_search, verdicts, .. } = self;
+        let rare = &libraries[0].rare;
+        verdicts.clear();
+        let bound = best.as_ref().map_or(f64::INFINITY, |known| known.cost);
+        let mut look_up = library_search.look_up(rare, verdicts, problem, model, bound);
+        loop {
+            let found = match &best {
+                Some(known) => look_up.better(known.cost),
+                None => look_up.next(bound, TRIES),
+            };
+            let Some(LibraryPlan { path, cost, preparatory, .. }) = found else { return best };
+            let guidance = Guidance { preparatory: Some(preparatory), route: Route::Library };
+            best = Some(Known { path, cost, guidance, least });
+        }
     }
 
     /// The best so far, or a plan by a manoeuvre that ends where a usual bay's goal would be, farther
@@ -119,10 +148,12 @@ impl GuidedPlanner {
         let in_cost = model.per_metre(*gear) * problem.mouth;
         let mut look_up = library_search.look_up_at(library, verdicts, problem, end, model, any);
         let (least, _) = look_up.least_estimates(library.len());
-        let mut tries = FIRST_TRIES;
         loop {
-            let bound = best.as_ref().map_or(any, |known| known.cost * (1.0 - GAIN) - in_cost);
-            let Some(LibraryPlan { mut path, preparatory, .. }) = look_up.next(bound, tries) else {
+            let found = match &best {
+                Some(known) => look_up.better(known.cost - in_cost),
+                None => look_up.next(any, FIRST_TRIES),
+            };
+            let Some(LibraryPlan { mut path, preparatory, .. }) = found else {
                 return best;
             };
             path.extend([straight]);
@@ -130,7 +161,6 @@ impl GuidedPlanner {
             let guidance = Guidance { preparatory: Some(preparatory), route: Route::Library };
             let least = best.as_ref().map_or(least + in_cost, |b| b.least.min(least + in_cost));
             best = Some(Known { path, cost, guidance, least });
-            tries = BETTER;
         }
     }
 
@@ -144,13 +174,15 @@ impl GuidedPlanner {
                 let (vehicle, footprint) = (&problem.vehicle, *problem.collision.footprint());
                 let manoeuvres = self.selector.manoeuvres(kind, vehicle);
                 let cost = self.hars.cost(vehicle);
-                let mut library = Library::new(&manoeuvres, vehicle, footprint, &cost);
+                let (common, rare) = manoeuvres.split_at(COMMON.min(manoeuvres.len()));
+                let prepared = |all| Library::new(all, vehicle, footprint, &cost);
+                let (mut library, rare) = (prepared(common), prepared(rare));
                 let straights = library.len();
                 for entry in self.hars.entry_straights(problem) {
                     library.add(entry, &cost);
                 }
                 self.libraries.truncate(LIBRARIES - 1);
-                self.libraries.insert(0, Prepared { kind, library, straights });
+                self.libraries.insert(0, Prepared { kind, library, straights, rare });
             }
         }
         self.libraries[0].straights > 0

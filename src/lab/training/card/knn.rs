@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::{INPUTS, VERSION, data, metrics, name, spots, vehicle};
 use crate::lab::dataset::Metadata;
-use crate::lab::training::knn::{KnnKindLog, KnnLog};
+use crate::lab::training::knn::{KnnConfig, KnnKindLog, KnnLog};
 
 /// The card of the `knn.bin` in `out`.
 pub(in crate::lab::training) fn knn(out: &Path, metadata: &Metadata, log: &KnnLog) -> String {
@@ -22,6 +22,15 @@ pub(in crate::lab::training) fn knn(out: &Path, metadata: &Metadata, log: &KnnLo
         let (occupied, cells) = (k.occupied_cells, k.cells);
         let _ = writeln!(stored, "| {kind} | {samples} | {occupied} of {cells} | {manoeuvres} |");
     }
+    let KnnConfig { worlds, seed } = log.config;
+    let learnt = match worlds {
+        0 => "The manoeuvres are those that serve many rows.".to_owned(),
+        _ => format!(
+            "The manoeuvres are those that serve the rows\nand {worlds} generated worlds of each type \
+             (seed {seed}), their sizes drawn far wider than those of any\nlevel; what is used most \
+             comes first."
+        ),
+    };
     let judged =
         |k: &KnnKindLog| k.leave_one_out.map(|l| (k.kind, l.reach.rows, l.errors, l.reach));
     let metrics = metrics(&log.kinds.iter().filter_map(judged).collect::<Vec<_>>());
@@ -65,8 +74,7 @@ are compared as points (x, y, r·cos θ, r·sin θ) with r = {radius:.4} m: half
 {data}
 ## What is stored
 
-Every solved row, and the manoeuvres that serve many of them: {bytes} bytes ({mebibytes:.2} MiB). Nothing
-is random here: the seed is that of the data.
+Every solved row, and manoeuvres: {bytes} bytes ({mebibytes:.2} MiB). {learnt}
 
 | type | samples | cells with samples | manoeuvres |
 |---|--:|--:|--:|

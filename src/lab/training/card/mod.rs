@@ -213,7 +213,8 @@ mod tests {
             leave_one_out,
         };
         let (data_sha256, heading_radius) = ("abc123".to_owned(), 2.25);
-        KnnLog { data_sha256, seed: 77, heading_radius, bytes: 3 << 19, kinds: vec![kind] }
+        let config = KnnConfig { worlds: 300, seed: 5 };
+        KnnLog { data_sha256, seed: 77, config, heading_radius, bytes: 3 << 19, kinds: vec![kind] }
     }
 
     fn assert_tells(card: &str, parts: &[&str]) {

@@ -1,0 +1,180 @@
+//! Manoeuvres learnt in many worlds: generated scenes whose sizes are drawn far wider than those of
+//! any level.
+//!
+//! Cells are two rectangles; scenes are not. World by world a teacher, Hybrid A* that takes the best
+//! of several solutions and improves it, is asked for a path. Where nothing known costs about as
+//! little, the end of the teacher's path is learnt. Then all worlds are planned once more with
+//! everything that is known: what no plan uses is forgotten, and what many use comes first.
+
+use indicatif::ProgressBar;
+use rand::RngExt;
+
+use super::library::Source;
+use crate::curves::Segment;
+use crate::lab::dataset::Metadata;
+use crate::planners::cost::CostModel;
+use crate::planners::library::{Library, LibrarySearch, Verdicts};
+use crate::planners::{Budget, Effort, HybridAStar, Planner, Problem};
+use crate::rng::{Stream, rng};
+use crate::selectors::fleet::scaled;
+use crate::vehicle::Vehicle;
+use crate::world::generate::{GeneratorConfig, LevelConfig, generate};
+use crate::world::{Level, ParkingType};
+
+/// A plan that costs at most so many times the teacher's will do.
+const GOOD: f64 = 1.05;
+/// Solutions that the teacher takes the best of.
+const SOLUTIONS: usize = 5;
+
+/// Worlds to learn in.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Worlds<'a> {
+    /// How many of each parking type.
+    pub count: u32,
+    /// What they are drawn from.
+    pub seed: u64,
+    /// Counts each of them twice.
+    pub progress: &'a ProgressBar,
+}
+
+impl Worlds<'_> {
+    /// What is worth knowing of `manoeuvres` and of those of these worlds for spots of type `kind`, in
+    /// the units of the `sources`; what is used most comes first. The worlds are divided among the
+    /// sources' vehicles. Without a world all stays as it is.
+    pub fn learn(
+        &self,
+        kind: ParkingType,
+        mut manoeuvres: Vec<Vec<Segment>>,
+        sources: &[Source],
+    ) -> Vec<Vec<Segment>> {
+        if self.count == 0 {
+            return manoeuvres;
+        }
+        let mut pupils: Vec<Pupil> = sources.iter().map(|s| Pupil::new(s, &manoeuvres)).collect();
+        for index in 0..self.count {
+            self.progress.inc(1);
+            let at = index as usize % pupils.len();
+            let Some(problem) = self.world(sources[at].metadata, kind, index) else { continue };
+            if let Some(learnt) = pupils[at].lesson(&problem) {
+                let learnt = scaled(&learnt, 1.0 / sources[at].unit);
+                for (pupil, source) in pupils.iter_mut().zip(sources) {
+                    pupil.library.add(scaled(&learnt, source.unit), &pupil.model);
+                }
+                manoeuvres.push(learnt);
+            }
+        }
+        let mut uses = vec![0_u32; manoeuvres.len()];
+        for index in 0..self.count {
+            self.progress.inc(1);
+            let at = index as usize % pupils.len();
+            let Some(problem) = self.world(sources[at].metadata, kind, index) else { continue };
+            if let Some(used) = pupils[at].used(&problem) {
+                uses[used] += 1;
+            }
+        }
+        let mut order: Vec<usize> = (0..manoeuvres.len()).filter(|&i| uses[i] > 0).collect();
+        order.sort_by_key(|&i| std::cmp::Reverse(uses[i]));
+        order.into_iter().map(|i| std::mem::take(&mut manoeuvres[i])).collect()
+    }
+
+    /// The world of a number; `None` where its sizes leave no room for the vehicle.
+    fn world(&self, metadata: &Metadata, kind: ParkingType, index: u32) -> Option<Problem> {
+        let vehicle = &metadata.vehicle;
+        let place = ParkingType::ALL.iter().position(|&k| k == kind)? as u64;
+        let mut rng = rng(self.seed, Stream::World, u64::from(index) << 8 | place);
+        let mut between = |min: f64, max: f64| rng.random_range(min..=max);
+        let config = drawn(vehicle, &mut between);
+        config.validate(vehicle).ok()?;
+        let scene = generate(&config, vehicle, kind, Level::Complex, rng.random(), 0);
+        Problem::new(&scene).ok()
+    }
+}
+
+/// Sizes of one world, in metres for the default vehicle, of `vehicle`'s size.
+fn drawn(vehicle: &Vehicle, between: &mut impl FnMut(f64, f64) -> f64) -> GeneratorConfig {
+    let mut size = |min: f64, max: f64| between(min, max) * vehicle.scale();
+    let exactly = |v: f64| [v, v];
+    let level = LevelConfig {
+        bay_spot_width: exactly(size(2.3, 4.2)),
+        parallel_spot_width: exactly(size(5.8, 8.2)),
+        dead_end_probability: 0.75,
+        dead_end: exactly(size(4.0, 13.0)),
+    };
+    let usual = GeneratorConfig::default();
+    GeneratorConfig {
+        easy: level,
+        complex: level,
+        extreme: level,
+        lane_width: size(4.6, 8.0),
+        bay_depth: size(5.25, 6.2),
+        parallel_depth: size(2.2, 2.8),
+        passing_room: size(0.9, 1.4),
+        max_slant: between(0.0, 0.08),
+        lane_car_probability: 0.4,
+        max_incline: 0.35,
+        start_reach: [-3.4, 3.4],
+        ..usual
+    }
+}
+
+/// A vehicle that learns.
+struct Pupil {
+    model: CostModel,
+    budget: Budget,
+    teacher: HybridAStar,
+    library: Library,
+    search: LibrarySearch,
+    verdicts: Verdicts,
+}
+
+impl Pupil {
+    fn new(source: &Source, manoeuvres: &[Vec<Segment>]) -> Self {
+        let Metadata { vehicle, planner, max_expansions, .. } = source.metadata;
+        let (search, verdicts) = Default::default();
+        Self {
+            model: planner.cost.scaled(vehicle.scale()),
+            budget: Budget { max_expansions: *max_expansions, effort: Effort::Usual },
+            teacher: HybridAStar::hold(*planner, SOLUTIONS),
+            library: source.library(manoeuvres),
+            search,
+            verdicts,
+        }
+    }
+
+    /// The end of the teacher's path, where nothing known does as well.
+    fn lesson(&mut self, problem: &Problem) -> Option<Vec<Segment>> {
+        if !self.library.fits(problem) {
+            return None;
+        }
+        let path = self.teacher.plan(problem, self.budget).outcome.ok()?;
+        let cost = self.model.path(&problem.vehicle, &path.segments);
+        let goal = self.teacher.goal_set(problem);
+        if self.teacher.direct_below(problem, problem.start, &goal, GOOD * cost).is_some() {
+            return None;
+        }
+        self.verdicts.clear();
+        let Self { library, search, verdicts, model, .. } = self;
+        match search.plan(library, verdicts, problem, model, GOOD * cost) {
+            Some(_) => None,
+            None => self.teacher.manoeuvre(problem, &path),
+        }
+    }
+
+    /// The manoeuvre that is planned with.
+    fn used(&mut self, problem: &Problem) -> Option<usize> {
+        if !self.library.fits(problem) {
+            return None;
+        }
+        self.verdicts.clear();
+        let Self { library, search, verdicts, model, .. } = self;
+        let goal = self.teacher.goal_set(problem);
+        let direct = self.teacher.direct(problem, problem.start, &goal).map(|leg| leg.cost);
+        let any = direct.unwrap_or(f64::INFINITY);
+        let mut look_up = search.look_up(library, verdicts, problem, model, any);
+        let mut best = look_up.next(any, usize::MAX)?;
+        while let Some(better) = look_up.better(best.cost) {
+            best = better;
+        }
+        Some(best.manoeuvre)
+    }
+}
