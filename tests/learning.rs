@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use n3p::curves::Segment;
 use n3p::geometry::{Pose, signed_angle};
 use n3p::lab::dataset::{Dataset, Metadata, Sample, Status};
+use n3p::lab::training::knn::KnnConfig;
 use n3p::lab::training::{self, Loss, MlpConfig, Targets, TrainingError, Validation};
 use n3p::planners::HybridAStarConfig;
 use n3p::rng::{Stream, rng};
@@ -104,9 +105,12 @@ fn samples(kind: ParkingType, cells: &[usize], per_cell: usize, seed: u64) -> Ve
 
 fn knn_of(samples: &[Sample], kinds: &[ParkingType], dir: &Path) -> KnnSelector {
     let path = dir.join("knn.bin");
-    training::knn::train(&metadata(), samples, kinds, &KnnConfig { worlds: 0, seed: 1 }, &path).unwrap();
+    training::knn::train(&metadata(), samples, kinds, &NO_WORLDS, &path).unwrap();
     KnnSelector::load(&path).unwrap()
 }
+
+/// Of the samples alone.
+const NO_WORLDS: KnnConfig = KnnConfig { worlds: 0, seed: 1 };
 
 fn features(start: Pose, cell: usize) -> Features {
     Features::new(start, metadata().grid.cell(KIND, cell))
@@ -234,9 +238,40 @@ fn one_file_holds_all_types_and_the_same_input_gives_the_same_bytes() {
         &metadata(),
         &samples(KIND, &[0], 5, 1),
         &ParkingType::ALL,
+        &NO_WORLDS,
         &dir.path().join("other.bin"),
     );
     assert!(matches!(error, Err(TrainingError::NoSamples(ParkingType::Forward))));
+}
+
+/// Whoever learns in worlds knows more, whatever the order of rows, and what is used most comes first.
+#[test]
+fn manoeuvres_are_learnt_in_worlds() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("knn.bin");
+    let few = samples(KIND, &[0], 5, 1);
+    let learnt = |worlds| {
+        let config = KnnConfig { worlds, seed: 3 };
+        training::knn::train(&metadata(), &few, &[KIND], &config, &path).unwrap();
+        (KnnSelector::load(&path).unwrap().manoeuvres(KIND, &metadata().vehicle), config)
+    };
+    let (none, _) = learnt(0);
+    let (some, config) = learnt(60);
+    assert!(some.len() > none.len() + 5, "{} and {}", some.len(), none.len());
+    assert_eq!(learnt(60).0, some, "the same worlds teach the same");
+    let text = card(&path);
+    assert!(text.contains("60 generated worlds of each type (seed 3)"), "{text}");
+    let log: training::knn::KnnLog =
+        serde_json::from_slice(&std::fs::read(training::log_path(&path)).unwrap()).unwrap();
+    assert_eq!(log.config, config);
+    let error = training::knn::train(
+        &metadata(),
+        &few,
+        &[KIND],
+        &KnnConfig { worlds: 2_000_000, seed: 3 },
+        &path,
+    );
+    assert!(error.unwrap_err().to_string().contains("worlds is 2000000; expected 0 to 1000000"));
 }
 
 fn quick(epochs: usize) -> MlpConfig {

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::worlds::Worlds;
 pub use super::leave_one_out::LeaveOneOut;
 use super::leave_one_out::leave_one_out;
 use super::library::{self, Source};
+use super::worlds::Worlds;
 use super::{TrainingError, card, settings, solved, write_beside};
 use crate::geometry::Pose;
 use crate::lab::dataset::{Metadata, Sample, content_sha256};

@@ -23,8 +23,12 @@ const FIRST_TRIES: usize = 16;
 /// passes something near on its way.
 const USUAL: f64 = 1.3;
 pub(super) const ENOUGH: f64 = 1.1;
+/// What costs more than this many times the estimate is looked at again by any spot.
+const DEAR: f64 = 3.0;
 /// Changes of gear that a parallel spot may take more than the curve through empty space.
-const TO_AND_FRO: f64 = 4.0;
+const TO_AND_FRO: usize = 4;
+/// Changes of gear that a bay takes as a rule.
+const INTO_A_BAY: usize = 2;
 /// Where the lane begins farther out than this beyond a usual spot's, metres for the default vehicle,
 /// manoeuvres are tried that end farther out, too.
 const DEEPER: f64 = 0.3;
@@ -54,6 +58,11 @@ pub(super) struct Known {
     pub(super) least: f64,
 }
 
+/// Changes of gear that a spot takes at most as a rule.
+fn most_changes(kind: Option<ParkingType>) -> usize {
+    if kind == Some(ParkingType::Parallel) { TO_AND_FRO } else { INTO_A_BAY }
+}
+
 impl GuidedPlanner {
     /// The cheapest of what is known without a search: manoeuvres of the library prepared last, and
     /// the curve straight to the goal where none of the first can be joined.
@@ -67,7 +76,7 @@ impl GuidedPlanner {
         let (manoeuvre, curve) = look_up.least_estimates(*straights);
         // Into a bay a curve may lead straight; a parallel spot takes some to and fro as a rule.
         let to_and_fro = match problem.kind {
-            Some(ParkingType::Parallel) => TO_AND_FRO * cost.gear_change,
+            Some(ParkingType::Parallel) => TO_AND_FRO as f64 * cost.gear_change,
             _ => 0.0,
         };
         let least = manoeuvre.min(curve + to_and_fro);
@@ -188,11 +197,15 @@ impl GuidedPlanner {
         self.libraries[0].straights > 0
     }
 
-    /// Whether a plan costs no more than usual: what is known of the spot says what it takes; where
-    /// that is little, the curve through empty space does.
+    /// Whether a plan costs no more than usual: what is known of the spot says what it takes, by a usual
+    /// one within wide limits, as manoeuvres for it were learnt in many worlds; where that is little, the
+    /// curve through empty space does.
     pub(super) fn is_usual(&mut self, problem: &Problem, goal: &GoalSet, known: &Known) -> bool {
-        known.cost <= USUAL * known.least
-            || known.cost <= ENOUGH * self.hars.lower_bound(problem, goal)
+        known.cost <= ENOUGH * self.hars.lower_bound(problem, goal)
+            || known.cost <= USUAL * known.least
+            || (known.cost <= DEAR * known.least
+                && known.path.direction_changes() <= most_changes(problem.kind)
+                && !self.is_unusual(problem))
     }
 
     /// Whether a plan costs more than usual by a spot that no cell of the model stands for.
