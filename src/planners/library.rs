@@ -102,18 +102,20 @@ impl Library {
     }
 
     /// The plan of a car that stands within a manoeuvre, or beside one: its rest, bent to begin at
-    /// the start. The cheapest of those that are free; `None` where the car stands within none.
-    pub fn rest(&self, problem: &Problem, model: &CostModel) -> Option<(Path, f64)> {
+    /// the start. The cheapest of those that are free and cost less than `bound`; `None` where the car
+    /// stands within none.
+    pub fn rest(&self, problem: &Problem, model: &CostModel, bound: f64) -> Option<(Path, f64)> {
         let start = problem.goal.relative(problem.start);
         let near = self.manoeuvres.iter().filter_map(|m| self.rest_of(m, start));
         let cost = |path: &Path| model.path(&self.vehicle, &path.segments);
-        let mut near: Vec<(f64, Path)> = near.map(|path| (cost(&path), path)).collect();
+        let near = near.map(|path| (cost(&path), path));
+        let mut near: Vec<(f64, Path)> = near.filter(|(cost, _)| *cost < bound).collect();
         near.sort_by(|a, b| a.0.total_cmp(&b.0));
         let bent = near.into_iter().take(RESTS).filter_map(|(_, rest)| {
             let begin = problem.goal.compose(rest.start);
             let path = joint::close(problem, &Path { start: begin, ..rest })?;
             let cost = cost(&path);
-            Some((path, cost))
+            (cost < bound).then_some((path, cost))
         });
         bent.min_by(|a, b| a.1.total_cmp(&b.1))
     }
@@ -127,9 +129,12 @@ impl Library {
         let (mut best, mut nearest) = (None, BESIDE * scale);
         let mut pose = manoeuvre.entry.pose;
         for (i, s) in motions.iter().enumerate() {
-            // Nothing of this motion comes as near as the best.
-            if pose.distance(start) <= s.length.abs() + nearest {
-                let steps = (s.length.abs() / (STRIDE * scale)).ceil().max(1.0);
+            // Nothing of this motion comes as near as the best: neither its places nor its headings.
+            let length = s.length.abs();
+            let turn = signed_angle(pose.heading, start.heading).abs();
+            let turns_there = (turn - length * s.curvature.abs()) * radius <= nearest;
+            if turns_there && pose.distance(start) <= length + nearest {
+                let steps = (length / (STRIDE * scale)).ceil().max(1.0);
                 for k in 0..steps as usize {
                     let driven = s.length * k as f64 / steps;
                     let at = s.at(pose, driven);

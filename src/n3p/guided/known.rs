@@ -201,11 +201,11 @@ impl GuidedPlanner {
     /// one within wide limits, as manoeuvres for it were learnt in many worlds; where that is little, the
     /// curve through empty space does.
     pub(super) fn is_usual(&mut self, problem: &Problem, goal: &GoalSet, known: &Known) -> bool {
-        known.cost <= ENOUGH * self.hars.lower_bound(problem, goal)
-            || known.cost <= USUAL * known.least
+        known.cost <= USUAL * known.least
             || (known.cost <= DEAR * known.least
                 && known.path.direction_changes() <= most_changes(problem.kind)
                 && !self.is_unusual(problem))
+            || known.cost <= ENOUGH * self.hars.lower_bound(problem, goal)
     }
 
     /// Whether a plan costs more than usual by a spot that no cell of the model stands for.
@@ -238,12 +238,12 @@ impl GuidedPlanner {
         let library = self.libraries.first().map(|p| &p.library).filter(|l| l.fits(problem));
         let Some(library) = library else { return known };
         let model = self.hars.cost(&problem.vehicle);
-        match library.rest(problem, &model) {
-            Some((path, cost)) if cost < known.cost => {
+        match library.rest(problem, &model, known.cost) {
+            Some((path, cost)) => {
                 let guidance = Guidance { preparatory: None, route: Route::Library };
                 Known { path, cost, guidance, least: known.least }
             }
-            _ => known,
+            None => known,
         }
     }
 }
