@@ -8,13 +8,13 @@ use crate::environment::courses::Course;
 use crate::lab::dataset::{CollectConfig, Subset};
 use crate::lab::evaluation::SuiteConfig;
 use crate::lab::evaluation::suite::MAX_COUNT;
-use crate::lab::toml_file::{TomlError, read_toml};
 use crate::lab::training::MlpConfig;
 use crate::lab::training::rl::RlConfig;
 use crate::n3p::RolloutConfig;
 use crate::n3p::guided::RankedConfig;
 use crate::n3p::{Method, MethodSettings};
 use crate::planners::{Budget, Effort, HybridAStarConfig, Problem};
+use crate::toml_file::{TomlError, read_toml};
 use crate::vehicle::Vehicle;
 use crate::world::{Level, ParkingType};
 
