@@ -5,8 +5,8 @@
 //! laid out by other principles: not one spot with its neighbours, but lanes with rows on both
 //! sides, then one free spot among them. Spots and cars have the sizes that they have in reality.
 //!
-//! Everything is laid out along a [`road`], straight or a gentle bend: stations along it, offsets
-//! across it ([`row`] fills rows, `park` composes them). The finished scene lies anywhere in the
+//! Everything is laid out along a `road`, straight or a gentle bend: stations along it, offsets
+//! across it (`row` fills rows, `park` composes them). The finished scene lies anywhere in the
 //! world, mirrored or not; in some, all is given as points, as far as it is visible from the lane
 //! (`scan`).
 //!
