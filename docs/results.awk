@@ -9,8 +9,8 @@ function cell(method, paper,   ours) {
   return paper == "" ? ours : ours " (" paper ")"
 }
 BEGIN { FS = "|" }
+/^## / { level = "" }
 /^## Level / { level = $0; sub(/^## Level /, "", level); sub(/:.*/, "", level) }
-/^## Mean/ { level = "" }
 level != "" && /^\| (forward|parallel|reverse) / {
   kind = trim($2); name = trim($3)
   if (!((level, kind) in seen)) { seen[level, kind] = 1; order[++n] = level SUBSEP kind }

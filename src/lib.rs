@@ -41,6 +41,7 @@
 //! - [`episode`]: one method on one scene, timed and checked
 //! - `environment` (feature of that name): what policies see, do and learn in
 //! - `lab` (feature of that name): what learns and compares: policies, data, training, evaluation, experiments
+//! - `toml_file` (feature `scene`): files of settings
 //! - `cli` (feature `plan`): arguments, output and exit codes of the binaries
 
 #![warn(missing_docs)]
@@ -62,6 +63,8 @@ pub mod planners;
 #[cfg(any(test, feature = "generate"))]
 pub mod rng;
 pub mod selectors;
+#[cfg(feature = "scene")]
+pub mod toml_file;
 pub mod vehicle;
 pub mod world;
 

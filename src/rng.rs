@@ -39,6 +39,8 @@ pub enum Stream {
     Clutter = 13,
     /// An unusual bay.
     Bay = 14,
+    /// A whole car park.
+    Lot = 15,
     /// A world to learn manoeuvres in.
     World = 20,
 }

@@ -190,6 +190,9 @@ fn eval_refuses_bad_arguments() {
     for (arguments, parts) in [
         (&["--type", "sideways"][..], &["sideways", "parallel"][..]),
         (&["--level", "hard"], &["hard", "extreme"]),
+        (&["--world", "moon"], &["moon", "lots"]),
+        (&["--world", "lots", "--level", "easy"], &["--level", "home"]),
+        (&["--world", "lots", "--scenes", "empty"], &["--world", "--scenes"]),
         (&["--methods", "ha-rs,nope"], &["nope", "n3p"]),
         (&["--methods", "knn-n3p", "--model", "none.bin"], &["none.bin", "n3p-train"]),
         (&["--methods", "rl-eval"], &["rl-eval.safetensors", "n3p-train rl --env eval"]),

@@ -148,3 +148,41 @@ fn runs_goes_on_and_reproduces() {
         .code(1)
         .stdout(contains("ok was false, is true"));
 }
+
+/// Every set of scenes has rows and a table of its own, and nothing is mixed.
+#[test]
+fn an_experiment_may_be_at_home_away_and_in_files() {
+    let dir = tempfile::tempdir().unwrap();
+    let real = dir.path().join("scenes/real");
+    std::fs::create_dir_all(&real).unwrap();
+    let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes/reverse.json");
+    std::fs::copy(fixture, real.join("reverse.json")).unwrap();
+    let text = "version = 1\nname = \"sets\"\nseed = 3\n[evaluate]\nmethods = [\"ha-rs\", \"mhha\"]\n\
+        worlds = [\"home\", \"lots\"]\nscenes = [\"../scenes/real\"]\nlevels = [\"easy\"]\n\
+        count = 2\nseed = 11\n";
+    std::fs::create_dir(dir.path().join("e")).unwrap();
+    std::fs::write(dir.path().join("e/sets.toml"), text).unwrap();
+    experiment(dir.path(), &["run", "e/sets.toml"]).success();
+    let results = dir.path().join("e/results/sets");
+    let rows = read_csv(&results.join("rows.csv")).unwrap();
+    let of = |set: &str| rows.iter().filter(|r| r.set == set).count();
+    assert_eq!((of("home"), of("lots"), of("real"), rows.len()), (12, 12, 2, 26));
+    assert!(rows.iter().all(|r| r.level.is_some() == (r.set == "home")));
+    let report = std::fs::read_to_string(results.join("report.md")).unwrap();
+    let found: Vec<&str> = report.lines().filter(|l| l.contains(": T in ms, Δδ")).collect();
+    let titles = ["## Level easy", "## Car parks (lots)", "## Scenes of real"];
+    assert!(found.iter().zip(titles).all(|(line, title)| line.starts_with(title)), "{found:?}");
+    assert_eq!(found.len(), 3, "{found:?}");
+    assert!(report.contains("12 generated (home and lots)") && report.contains("1 from files"));
+    let page = std::fs::read_to_string(results.join("report.html")).unwrap();
+    assert!(page.contains("Car parks (lots)") && page.contains("Scenes of real"));
+    experiment(dir.path(), &["run", "e/sets.toml"]).success().stderr(contains("nothing to do"));
+    experiment(dir.path(), &["reproduce", "e/sets.toml"]).success();
+    // What a folder holds is a part of the settings.
+    std::fs::write(real.join("broken.json"), "{").unwrap();
+    experiment(dir.path(), &["run", "e/sets.toml"]).code(2).stderr(contains("broken.json"));
+    std::fs::remove_file(real.join("broken.json")).unwrap();
+    std::fs::copy(real.join("reverse.json"), real.join("twin.json")).unwrap();
+    experiment(dir.path(), &["run", "e/sets.toml"]).success();
+    assert_eq!(read_csv(&results.join("rows.csv")).unwrap().len(), 28);
+}

@@ -337,7 +337,8 @@ fn what_is_no_tolerance_is_refused_by_field_and_value() {
 #[test]
 fn an_evaluation_plans_to_the_cheapest_goal() {
     let scene = fixture("three-bays.json");
-    let case = Case { scene: scene.clone(), kind: scene.parking_type, level: None };
+    let set = String::new();
+    let case = Case { scene: scene.clone(), kind: scene.parking_type, level: None, set };
     let mut planner = HybridAStar::new(HybridAStarConfig::default());
     let config = EpisodeConfig::new(BUDGET);
     let episode = episode::run(&case, &mut planner, &config, &oracle::JUDGE).unwrap();

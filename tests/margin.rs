@@ -63,7 +63,9 @@ fn plans_keep_the_margin_in_the_eyes_of_the_oracle() {
         let (mut found, mut whole) = (0, 0);
         for i in 0..30 {
             let kind = ParkingType::ALL[i as usize % 3];
-            let case = Case { scene: scene(kind, Level::Easy, i), kind: Some(kind), level: None };
+            let set = String::new();
+            let case =
+                Case { scene: scene(kind, Level::Easy, i), kind: Some(kind), level: None, set };
             let usual = EpisodeConfig::new(BUDGET);
             let config = EpisodeConfig { margin_m: ASKED, repeats: 0, ..usual };
             let episode = episode::run(&case, planner.as_mut(), &config, &oracle::JUDGE).unwrap();

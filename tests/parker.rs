@@ -84,7 +84,7 @@ fn plans_are_those_of_the_evaluation() {
         let plan = parker(&scene).plan_scene(&scene).unwrap();
         let models = Models::compiled_in(&scene.vehicle).unwrap();
         let mut planner = Method::N3P.build(&models, &MethodSettings::default()).unwrap();
-        let case = Case { kind: None, level: None, scene };
+        let case = Case { kind: None, level: None, set: String::new(), scene };
         let config = EpisodeConfig { repeats: 0, ..EpisodeConfig::new(Budget::default()) };
         let episode = episode::run(&case, planner.as_mut(), &config, &oracle::JUDGE).unwrap();
         assert!(episode.row.ok, "{:?}", episode.row);

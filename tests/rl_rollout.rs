@@ -56,7 +56,12 @@ fn even_a_random_walk_parks_and_passes_the_independent_check() {
     let mut parked = 0;
     for kind in ParkingType::ALL {
         for index in 0..20 {
-            let case = Case { scene: scene(kind, index), kind: Some(kind), level: None };
+            let case = Case {
+                scene: scene(kind, index),
+                kind: Some(kind),
+                level: None,
+                set: String::new(),
+            };
             let config = EpisodeConfig::new(BUDGET);
             let row = episode::run(&case, &mut planner, &config, &oracle::JUDGE).unwrap().row;
             assert_eq!(row.method, "policy");

@@ -96,7 +96,7 @@ fn cases(scenes: &Bound<'_, PyAny>) -> Result<Vec<Case>, Fault> {
                 format!("scene name {:?} occurs twice; give every scene its own", scene.name);
             return Err(Fault::bad(text));
         }
-        cases.push(Case { kind: scene.parking_type, level, scene });
+        cases.push(Case { kind: scene.parking_type, level, set: String::new(), scene });
     }
     Ok(cases)
 }
@@ -211,6 +211,7 @@ fn columns<'py>(py: Python<'py>, rows: &[Row]) -> Result<Bound<'py, PyAny>, Faul
             "cost_over_best" => number(|r| r.cost_over_best),
             "changes_over_fewest" => number(|r| r.changes_over_fewest.map(f64::from)),
             "way_clearance_m" => number(|r| r.way_clearance_m),
+            "set" => text(|r| &r.set)?,
             other => return Err(Fault::Bug(format!("column {other} is not known here"))),
         };
         columns.set_item(name, column)?;

@@ -9,7 +9,7 @@ use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput, PolicyArgs};
 use n3p::episode::Case;
 use n3p::lab::evaluation::report::{self, Provenance};
-use n3p::lab::evaluation::suite::{self, SuiteConfig, SuiteError};
+use n3p::lab::evaluation::suite::{self, SuiteConfig, SuiteError, World};
 use n3p::lab::evaluation::{Outputs, metrics, quality};
 use n3p::lab::progress;
 use n3p::lab::training;
@@ -34,13 +34,17 @@ struct Args {
     /// Parking type [default: all that the models know].
     #[arg(long = "type", value_enum, value_name = "TYPE")]
     kind: Option<ParkingType>,
-    /// Difficulty of the generated scenes [default: all].
+    /// Where generated scenes lie: "home", parking lots as in the paper; "lots", whole car parks and
+    /// streets, for which nothing is trained. May be given several times [default: home].
+    #[arg(long = "world", value_enum, value_name = "WORLD", conflicts_with = "scenes")]
+    worlds: Vec<World>,
+    /// Difficulty of the generated scenes at home [default: all].
     #[arg(long, value_enum, conflicts_with = "scenes")]
     level: Option<Level>,
     /// Methods, separated by commas [default: all that the models allow].
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     methods: Vec<Method>,
-    /// Generated scenes per type and level.
+    /// Generated scenes per type, at home per type and level.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=suite::MAX_COUNT as i64))]
     count: u32,
     /// Seed of the generated scenes and of the intervals.
@@ -191,20 +195,18 @@ fn choose(args: &Args, vehicle: &Vehicle, methods: &[Method], models: &Models) -
         None => ParkingType::ALL.into_iter().filter(known).collect(),
     };
     let levels = args.level.map_or(Level::ALL.to_vec(), |l| vec![l]);
-    let cases = suite::generated(
-        &GeneratorConfig::default(),
-        vehicle,
-        &kinds,
-        &levels,
-        args.count as usize,
-        args.seed,
-    )
-    .or_bad_input()?;
-    let title = format!(
-        "{} generated, {} of each type and level, seed {}",
-        cases.len(),
-        args.count,
-        args.seed
-    );
+    let worlds = if args.worlds.is_empty() { &[World::Home][..] } else { &args.worlds };
+    if args.level.is_some() && !worlds.contains(&World::Home) {
+        let text = "--level: only the world home has levels; leave it out";
+        return Err(BadInput(text.to_owned()).into());
+    }
+    let (count, mut cases) = (args.count as usize, Vec::new());
+    let generator = GeneratorConfig::default();
+    for &world in worlds {
+        let of_world =
+            suite::of_world(world, &generator, vehicle, &kinds, &levels, count, args.seed);
+        cases.extend(of_world.or_bad_input()?);
+    }
+    let title = suite::title(cases.len(), worlds, count, args.seed);
     Ok(Chosen { cases, title, complaint: None })
 }

@@ -151,7 +151,7 @@ fn plan(args: &Args) -> Result<ExitCode> {
     }
     let (method, models) = choose(args, &scene, &problem)?;
     let mut planner = method.build(&models, &MethodSettings::default()).or_bad_input()?;
-    let case = Case { kind: problem.kind, level: None, scene };
+    let case = Case { kind: problem.kind, level: None, set: String::new(), scene };
     // One run, as it comes: the time includes what a first call costs.
     let budget = Budget { max_expansions: args.max_expansions, effort: args.effort };
     let usual = EpisodeConfig::new(budget);

@@ -26,6 +26,9 @@ pub struct Case {
     pub kind: Option<ParkingType>,
     /// Difficulty, for generated scenes.
     pub level: Option<Level>,
+    /// Which of a run's sets of scenes it belongs to: `home`, `lots`, or the name of a folder;
+    /// empty where there is only one.
+    pub set: String,
 }
 
 /// How episodes are run.
@@ -159,6 +162,7 @@ fn blank_row(case: &Case, method: &str, plan_time_s: f64) -> Row {
         cost_over_best: None,
         changes_over_fewest: None,
         way_clearance_m: None,
+        set: case.set.clone(),
     }
 }
 

@@ -52,11 +52,13 @@ pub struct Row {
     /// Smallest distance to an obstacle on the way, from 1 m after the start to 1 m before the goal
     /// (for the default vehicle), metres; empty without obstacles, and where the path is shorter.
     pub way_clearance_m: Option<f64>,
+    /// The set of scenes it belongs to, as in [`Case`](super::Case).
+    pub set: String,
 }
 
 impl Row {
     /// Names of the columns, in order.
-    pub const COLUMNS: [&'static str; 19] = [
+    pub const COLUMNS: [&'static str; 20] = [
         "scene",
         "type",
         "level",
@@ -76,11 +78,12 @@ impl Row {
         "cost_over_best",
         "changes_over_fewest",
         "way_clearance_m",
+        "set",
     ];
 
     /// How many columns at the end were added to the format later, as many at once: files of before
     /// are without them.
-    pub(crate) const ADDED: [usize; 2] = [2, 1];
+    pub(crate) const ADDED: [usize; 3] = [2, 1, 1];
 
     /// The columns that files of before may be without.
     pub fn added() -> &'static [&'static str] {
@@ -118,7 +121,7 @@ impl Row {
     }
 
     /// The values as text, in the order of [`Row::COLUMNS`].
-    pub fn fields(&self) -> [String; 19] {
+    pub fn fields(&self) -> [String; 20] {
         fn text<T: ToString>(v: &Option<T>) -> String {
             v.as_ref().map(T::to_string).unwrap_or_default()
         }
@@ -142,6 +145,7 @@ impl Row {
             text(&self.cost_over_best),
             text(&self.changes_over_fewest),
             text(&self.way_clearance_m),
+            self.set.clone(),
         ]
     }
 

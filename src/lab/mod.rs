@@ -2,7 +2,7 @@
 //!
 //! In reading order; each uses those above it and the planner, never one below.
 //!
-//! - [`progress`]: progress bars; [`toml_file`]: files of settings
+//! - [`progress`]: progress bars
 //! - [`nn`]: pieces of neural networks
 //! - [`rl`]: policies of reinforcement learning
 //! - [`dataset`]: collecting samples into Parquet, and reading them back
@@ -16,5 +16,4 @@ pub mod experiments;
 pub mod nn;
 pub mod progress;
 pub mod rl;
-pub mod toml_file;
 pub mod training;

@@ -1,8 +1,8 @@
 //! The world a car parks in: scenes, collision, cells and the abstraction.
 //!
 //! In reading order: a [`Scene`] is what a user gives ([`mod@scene`] reads files, [`goals`] is where
-//! paths may end, [`mod@tpcap`] a benchmark's, `generate` makes scenes, `bays` unusual ones, `clutter` some that are no parking
-//! lots); [`spot`] finds the spot frame that everything below works in; [`Obstacles`] is a scene's geometry in any frame; [`collision`] answers
+//! paths may end, [`mod@tpcap`] a benchmark's, `generate` makes scenes, `lots` whole car parks, `bays`
+//! unusual spots, `clutter` what is no parking lot); [`spot`] finds the spot frame that everything below works in; [`Obstacles`] is a scene's geometry in any frame; [`collision`] answers
 //! whether a motion is free; [`cell`] defines the abstracted environments 𝓔 of the paper and
 //! [`abstraction`] finds them in a scene.
 
@@ -17,6 +17,8 @@ pub mod collision;
 pub mod generate;
 pub mod goals;
 mod kind;
+#[cfg(any(test, feature = "generate"))]
+pub mod lots;
 mod obstacles;
 pub mod scene;
 mod scene_file;

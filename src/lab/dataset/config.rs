@@ -6,8 +6,8 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::schema::{FORMAT_VERSION, GIT_REVISION, Metadata};
-use crate::lab::toml_file::{TomlError, read_toml};
 use crate::planners::HybridAStarConfig;
+use crate::toml_file::{TomlError, read_toml};
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
 use crate::world::cell::Grid;

@@ -4,7 +4,7 @@
 //! which are given. What a method decides is the way between.
 
 use super::metrics::{self, percentile};
-use super::table::{Table, kind_name};
+use super::table::{Table, kind_name, part_name};
 use crate::episode::Row;
 
 /// How to read the table.
@@ -17,7 +17,7 @@ scenes.";
 pub fn table(rows: &[Row]) -> Table {
     let mut lines = Vec::new();
     for group in metrics::grouped(rows) {
-        let level = group.level.map_or("files".to_owned(), |l| l.to_string());
+        let level = part_name(group.set, group.level);
         for (method, rows) in group.methods {
             let median = |clearance: fn(&Row) -> Option<f64>| {
                 let solved = rows.iter().filter(|r| r.ok);

@@ -1,4 +1,4 @@
-//! Rows → numbers: summaries per level, type and method, with bootstrap intervals.
+//! Rows → numbers: summaries per set, level, type and method, with bootstrap intervals.
 //!
 //! Times are taken over all scenes of a group, failures included (a failed search costs
 //! its time too); everything that describes a path over the solved scenes alone.
@@ -74,10 +74,12 @@ pub struct SpeedUp {
     pub interval: Interval,
 }
 
-/// The summaries of one level and type, in the order of the methods' first rows.
+/// The summaries of one set, level and type, in the order of the methods' first rows.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Group {
-    /// Difficulty; `None` for scenes from files.
+    /// The set of scenes.
+    pub set: String,
+    /// Difficulty; `None` where the set has no levels.
     pub level: Option<Level>,
     /// Parking type, where known.
     #[serde(rename = "type")]
@@ -137,8 +139,9 @@ fn total(method: &str, all: &[&Row]) -> Totals {
     }
 }
 
-/// The rows of one level and type, by method in the order of their first rows.
+/// The rows of one set, level and type, by method in the order of their first rows.
 pub(super) struct Grouped<'a> {
+    pub set: &'a str,
     pub level: Option<Level>,
     pub kind: Option<ParkingType>,
     pub methods: Vec<(&'a str, Vec<&'a Row>)>,
@@ -158,27 +161,37 @@ pub(super) fn by_method<'a>(rows: &[&'a Row]) -> Vec<(&'a str, Vec<&'a Row>)> {
     methods
 }
 
-/// The `rows` whose method applies to their scene, by level (hardest last) and type.
+/// The `rows` whose method applies to their scene, by set (in the order of their first rows), level
+/// (hardest last) and type.
 pub(super) fn grouped(rows: &[Row]) -> Vec<Grouped<'_>> {
     let rows: Vec<&Row> = rows.iter().filter(|r| r.applies()).collect();
-    let mut keys: Vec<_> = rows.iter().map(|r| (r.level, r.kind)).collect();
+    let mut sets: Vec<&str> = Vec::new();
+    let mut keys = Vec::new();
+    for row in &rows {
+        let set = sets.iter().position(|s| *s == row.set).unwrap_or_else(|| {
+            sets.push(&row.set);
+            sets.len() - 1
+        });
+        keys.push((set, row.level, row.kind));
+    }
     // Types as in every table, scenes of no known type last.
     let place = |kind| ParkingType::ALL.iter().position(|k| Some(*k) == kind);
-    keys.sort_by_key(|(level, kind)| (*level, place(*kind).unwrap_or(usize::MAX)));
+    keys.sort_by_key(|(set, level, kind)| (*set, *level, place(*kind).unwrap_or(usize::MAX)));
     keys.dedup();
-    let group = |(level, kind)| {
-        let of_group = |r: &&Row| (r.level, r.kind) == (level, kind);
+    let group = |(set, level, kind): (usize, Option<Level>, Option<ParkingType>)| {
+        let set = sets[set];
+        let of_group = |r: &&Row| (&r.set[..], r.level, r.kind) == (set, level, kind);
         let own: Vec<&Row> = rows.iter().copied().filter(of_group).collect();
-        Grouped { level, kind, methods: by_method(&own) }
+        Grouped { set, level, kind, methods: by_method(&own) }
     };
     keys.into_iter().map(group).collect()
 }
 
-/// Summarises the `rows` whose method applies to their scene by level (hardest last) and
+/// Summarises the `rows` whose method applies to their scene by set, level (hardest last) and
 /// type. `seed` drives the resampling.
 pub fn summarise(rows: &[Row], seed: u64) -> Vec<Group> {
     let mut groups = Vec::new();
-    for (g, Grouped { level, kind, methods }) in grouped(rows).into_iter().enumerate() {
+    for (g, Grouped { set, level, kind, methods }) in grouped(rows).into_iter().enumerate() {
         let reference = methods
             .iter()
             .filter(|(name, _)| name.parse().is_ok_and(Method::is_graph_search))
@@ -194,7 +207,7 @@ pub fn summarise(rows: &[Row], seed: u64) -> Vec<Group> {
                 summary(name, list, seed, stream, speed_up)
             })
             .collect();
-        groups.push(Group { level, kind, summaries });
+        groups.push(Group { set: set.to_owned(), level, kind, summaries });
     }
     groups
 }
@@ -316,6 +329,7 @@ pub(super) mod tests {
             cost_over_best: None,
             changes_over_fewest: None,
             way_clearance_m: ok.then_some(0.2),
+            set: "home".into(),
         }
     }
 

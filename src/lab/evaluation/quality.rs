@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use serde::Serialize;
 
 use super::metrics::{self, percentile};
-use super::table::{Table, kind_name};
+use super::table::{Table, kind_name, part_name};
 use crate::episode::Row;
 use crate::episode::comparison::{best, measured};
 use crate::world::{Level, ParkingType};
@@ -61,10 +61,12 @@ pub struct Quality {
     pub groups: Vec<QualityGroup>,
 }
 
-/// The methods in the scenes of one level and type.
+/// The methods in the scenes of one set, level and type.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct QualityGroup {
-    /// Difficulty; `None` for scenes from files.
+    /// The set of scenes.
+    pub set: String,
+    /// Difficulty; `None` where the set has no levels.
     pub level: Option<Level>,
     /// Parking type, where known.
     #[serde(rename = "type")]
@@ -80,6 +82,7 @@ pub fn summarise(rows: &[Row]) -> Quality {
         methods.iter().map(|(name, rows)| quality(name, rows, &best)).collect()
     };
     let group = |g: metrics::Grouped| QualityGroup {
+        set: g.set.to_owned(),
         level: g.level,
         kind: g.kind,
         methods: compared(&g.methods),
@@ -96,10 +99,10 @@ impl Quality {
     /// groups.
     pub(super) fn parts(&self) -> impl Iterator<Item = (String, String, &[MethodQuality])> {
         let all = ("all".to_owned(), "all".to_owned(), &self.all[..]);
-        let groups = self.groups.iter().map(|g| {
-            let level = g.level.map_or("files".to_owned(), |l| l.to_string());
-            (level, kind_name(g.kind), &g.methods[..])
-        });
+        let groups = self
+            .groups
+            .iter()
+            .map(|g| (part_name(&g.set, g.level), kind_name(g.kind), &g.methods[..]));
         (groups.len() > 1).then_some(all).into_iter().chain(groups)
     }
 }

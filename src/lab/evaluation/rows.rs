@@ -143,6 +143,7 @@ pub fn write_parquet(path: &Path, rows: &[Row]) -> Result<(), RowsError> {
         number(|r| r.cost_over_best),
         count(|r| r.changes_over_fewest),
         number(|r| r.way_clearance_m),
+        text(|r| Some(r.set.clone())),
     ];
     let named = Row::COLUMNS.into_iter().zip(columns).map(|(name, column)| (name, column, true));
     let batch = RecordBatch::try_from_iter_with_nullable(named)
@@ -185,6 +186,7 @@ fn from_fields(f: &[String]) -> Result<Row, String> {
         cost_over_best: maybe(f, 16)?,
         changes_over_fewest: maybe(f, 17)?,
         way_clearance_m: maybe(f, 18)?,
+        set: f[19].clone(),
     })
 }
 
@@ -234,6 +236,7 @@ mod tests {
             cost_over_best: Some(1.0 + 1.0 / 3.0),
             changes_over_fewest: Some(1),
             way_clearance_m: Some(0.1 + 0.2),
+            set: "lots".into(),
         }
     }
 
@@ -250,11 +253,13 @@ mod tests {
             std::fs::write(&path, text.lines().map(kept).collect::<String>()).unwrap();
             read_csv(&path)
         };
-        let before = Row { way_clearance_m: None, ..row() };
+        let before = Row { set: String::new(), ..row() };
         assert_eq!(without(1).unwrap(), [before.clone(), before.clone()]);
+        let before = Row { way_clearance_m: None, ..before };
+        assert_eq!(without(2).unwrap(), [before.clone(), before.clone()]);
         let before = Row { cost_over_best: None, changes_over_fewest: None, ..before };
-        assert_eq!(without(3).unwrap(), [before.clone(), before]);
-        assert!(without(2).unwrap_err().to_string().contains("header"));
+        assert_eq!(without(4).unwrap(), [before.clone(), before]);
+        assert!(without(3).unwrap_err().to_string().contains("header"));
         std::fs::write(&path, text.replace(",changes_over_fewest", "")).unwrap();
         assert!(read_csv(&path).unwrap_err().to_string().contains("header"));
     }

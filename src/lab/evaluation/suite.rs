@@ -5,6 +5,8 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
+use serde::{Deserialize, Serialize};
+
 use super::oracle;
 use crate::episode::{self, Case, Episode, EpisodeConfig, Row};
 use crate::n3p::{Method, MethodError, MethodSettings};
@@ -13,6 +15,7 @@ use crate::planners::goals::{self, Terms};
 use crate::planners::{Budget, Planner, ProblemError};
 use crate::vehicle::Vehicle;
 use crate::world::generate::{GeneratorConfig, GeneratorError, generate};
+use crate::world::lots::lot;
 use crate::world::scene::SceneError;
 use crate::world::{Level, ParkingType, Scene};
 
@@ -68,10 +71,68 @@ pub enum SuiteError {
     Models(#[from] ModelsError),
 }
 
+/// Where generated scenes lie.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum World {
+    /// Parking lots as in the paper, of three levels: what methods are trained and tuned for.
+    Home,
+    /// Whole car parks and streets, for which nothing is trained or tuned.
+    Lots,
+}
+
+impl World {
+    /// The name used in files, in rows and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Home => "home",
+            Self::Lots => "lots",
+        }
+    }
+}
+
 /// The most scenes of one type and level: they are held in memory.
 pub const MAX_COUNT: usize = 100_000;
 
-/// Generated scenes: `count` of each type and level, a function of the seed alone.
+/// Generated scenes of a world, a function of the arguments alone: `count` of each type, at home of
+/// each type and level, drawn from `config`. Elsewhere there are no levels.
+pub fn of_world(
+    world: World,
+    config: &GeneratorConfig,
+    vehicle: &Vehicle,
+    kinds: &[ParkingType],
+    levels: &[Level],
+    count: usize,
+    seed: u64,
+) -> Result<Vec<Case>, SuiteError> {
+    match world {
+        World::Home => generated(config, vehicle, kinds, levels, count, seed),
+        World::Lots => {
+            let settings = kinds.iter().flat_map(|&k| (0..count as u64).map(move |i| (k, i)));
+            let case = |(kind, index)| Case {
+                scene: lot(vehicle, kind, seed, index),
+                kind: Some(kind),
+                level: None,
+                set: World::Lots.name().to_owned(),
+            };
+            Ok(settings.map(case).collect())
+        }
+    }
+}
+
+/// What generated scenes are, for reports: `total` of these worlds, `count` of each type and level.
+pub fn title(total: usize, worlds: &[World], count: usize, seed: u64) -> String {
+    match worlds {
+        [World::Home] => format!("{total} generated, {count} of each type and level, seed {seed}"),
+        _ => {
+            let names: Vec<&str> = worlds.iter().map(|w| w.name()).collect();
+            let names = names.join(" and ");
+            format!("{total} generated ({names}), {count} of each type and level, seed {seed}")
+        }
+    }
+}
+
+/// Scenes of the world [`World::Home`].
 pub fn generated(
     config: &GeneratorConfig,
     vehicle: &Vehicle,
@@ -86,7 +147,8 @@ pub fn generated(
         for &level in levels {
             for index in 0..count as u64 {
                 let scene = generate(config, vehicle, kind, level, seed, index);
-                cases.push(Case { scene, kind: Some(kind), level: Some(level) });
+                let set = World::Home.name().to_owned();
+                cases.push(Case { scene, kind: Some(kind), level: Some(level), set });
             }
         }
     }
@@ -115,13 +177,15 @@ impl Folder {
 
 /// The scenes of a folder, of one parking type if `kind` is given. Files that hold no scene, or one
 /// whose start or goal is not free on these `terms`, are left out and named. Where that leaves
-/// nothing, or there is nothing, it is an error.
+/// nothing, or there is nothing, it is an error. Their set has the folder's name.
 pub fn from_folder(
     dir: &Path,
     kind: Option<ParkingType>,
     terms: Terms,
 ) -> Result<Folder, SuiteError> {
     let read = Scene::read_each(dir)?;
+    let real = dir.canonicalize().unwrap_or_else(|_| dir.to_owned());
+    let set = real.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut folder = Folder { cases: Vec::new(), unusable: Vec::new(), files: read.len() };
     for (path, scene) in read {
         let scene = match scene {
@@ -133,7 +197,10 @@ pub fn from_folder(
             }
         };
         match goals::first_problem(&scene, terms) {
-            Ok(_) => folder.cases.push(Case { kind: scene.parking_type, level: None, scene }),
+            Ok(_) => {
+                let kind = scene.parking_type;
+                folder.cases.push(Case { kind, level: None, set: set.clone(), scene });
+            }
             Err(error) => {
                 let scene = format!("{} ({})", scene.name, path.display());
                 folder.unusable.push(SuiteError::Unsolvable { scene, error }.to_string());

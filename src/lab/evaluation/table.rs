@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::metrics::{Group, Interval, Summary};
+use super::suite::World;
 use crate::episode::Row;
 use crate::n3p::Method;
 use crate::world::{Level, ParkingType};
@@ -77,13 +78,13 @@ pub(super) fn printed<'p>(
     paper.iter().find(|p| Some(p.level) == level && Some(p.kind) == kind && p.method == name)
 }
 
-/// One table per level: each method's line, and under it the paper's where it has one.
+/// One table per set and level: each method's line, and under it the paper's where it has one.
 pub fn comparison(groups: &[Group]) -> Vec<Table> {
     let paper = paper_rows();
     let mut tables = Vec::new();
-    for level in levels(groups) {
+    for part @ (set, level) in parts(groups) {
         let mut rows = Vec::new();
-        for group in groups.iter().filter(|g| g.level == level) {
+        for group in groups.iter().filter(|g| is_of(g, part)) {
             for s in &group.summaries {
                 let cells = numbers(s);
                 rows.push(line(group.kind, &s.method, "this run", cells));
@@ -97,7 +98,7 @@ pub fn comparison(groups: &[Group]) -> Vec<Table> {
             "fail %", "N_dc", "max N_dc", "N_node",
         ];
         tables.push(Table {
-            title: format!("{}: T in ms, Δδ in rad, length in m", level_title(level)),
+            title: format!("{}: T in ms, Δδ in rad, length in m", part_title(set, level)),
             headers: headers.map(str::to_owned).to_vec(),
             rows,
             text_columns: 3,
@@ -121,7 +122,7 @@ pub fn speed_ups(groups: &[Group]) -> Table {
                 ),
             };
             rows.push(vec![
-                group.level.map_or("files".to_owned(), |l| l.to_string()),
+                part_name(&group.set, group.level),
                 kind_name(group.kind),
                 s.method.clone(),
                 reference,
@@ -171,14 +172,35 @@ pub fn failures(rows: &[Row]) -> Table {
     }
 }
 
-pub(super) fn levels(groups: &[Group]) -> Vec<Option<Level>> {
-    let mut levels: Vec<_> = groups.iter().map(|g| g.level).collect();
-    levels.dedup();
-    levels
+/// What one table is about: a set and a level.
+pub(super) type Part<'a> = (&'a str, Option<Level>);
+
+pub(super) fn parts(groups: &[Group]) -> Vec<Part<'_>> {
+    let mut parts: Vec<_> = groups.iter().map(|g| (&g.set[..], g.level)).collect();
+    parts.dedup();
+    parts
 }
 
-pub(super) fn level_title(level: Option<Level>) -> String {
-    level.map_or("Scenes from files".to_owned(), |l| format!("Level {l}"))
+pub(super) fn is_of(group: &Group, part: Part) -> bool {
+    (&group.set[..], group.level) == part
+}
+
+/// A set and level in one word: only the scenes at home have levels.
+pub(super) fn part_name(set: &str, level: Option<Level>) -> String {
+    match level {
+        Some(level) => level.to_string(),
+        None if set.is_empty() => "files".to_owned(),
+        None => set.to_owned(),
+    }
+}
+
+pub(super) fn part_title(set: &str, level: Option<Level>) -> String {
+    match level {
+        Some(level) => format!("Level {level}"),
+        None if set.is_empty() => "Scenes from files".to_owned(),
+        None if set == World::Lots.name() => format!("Car parks ({set})"),
+        None => format!("Scenes of {set}"),
+    }
 }
 
 pub(super) fn kind_name(kind: Option<ParkingType>) -> String {

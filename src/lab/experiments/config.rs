@@ -7,8 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::environment::courses::Course;
 use crate::lab::dataset::{CollectConfig, Subset};
 use crate::lab::evaluation::SuiteConfig;
-use crate::lab::evaluation::suite::MAX_COUNT;
-use crate::lab::toml_file::{TomlError, read_toml};
+use crate::lab::evaluation::suite::{MAX_COUNT, World};
 use crate::lab::training::MlpConfig;
 use crate::lab::training::knn::KnnConfig;
 use crate::lab::training::rl::RlConfig;
@@ -16,6 +15,7 @@ use crate::n3p::RolloutConfig;
 use crate::n3p::guided::RankedConfig;
 use crate::n3p::{Method, MethodSettings};
 use crate::planners::{Budget, Effort, HybridAStarConfig, Problem};
+use crate::toml_file::{TomlError, read_toml};
 use crate::vehicle::Vehicle;
 use crate::world::generate::GeneratorConfig;
 use crate::world::{Level, ParkingType};
@@ -108,7 +108,7 @@ impl LearningCurveConfig {
     }
 }
 
-/// Which methods run on which generated scenes.
+/// Which methods run on which scenes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EvaluateConfig {
@@ -117,10 +117,17 @@ pub struct EvaluateConfig {
     /// Parking types; collected and trained for, too.
     #[serde(default = "all_types")]
     pub types: Vec<ParkingType>,
-    /// Levels.
+    /// Where the generated scenes lie, each world a set of its own; may be empty where there are
+    /// `scenes`.
+    #[serde(default = "home")]
+    pub worlds: Vec<World>,
+    /// Folders of scene files, relative to the experiment's file, each a set of its own.
+    #[serde(default)]
+    pub scenes: Vec<PathBuf>,
+    /// Levels of the scenes at home.
     #[serde(default = "all_levels")]
     pub levels: Vec<Level>,
-    /// Scenes per type and level.
+    /// Generated scenes per type, at home per type and level.
     pub count: usize,
     /// Seed of the scenes and of the bootstrap intervals.
     pub seed: u64,
@@ -150,6 +157,11 @@ impl EvaluateConfig {
         Budget { max_expansions: self.max_expansions, effort: self.effort }
     }
 
+    /// Whether the scenes of this set are generated.
+    pub(super) fn generates(&self, set: &str) -> bool {
+        self.worlds.iter().any(|w| w.name() == set)
+    }
+
     /// These settings for `methods`, one thread.
     pub(super) fn suite(&self, methods: &[Method]) -> SuiteConfig {
         SuiteConfig {
@@ -165,6 +177,10 @@ impl EvaluateConfig {
 
 fn all_types() -> Vec<ParkingType> {
     ParkingType::ALL.to_vec()
+}
+
+fn home() -> Vec<World> {
+    vec![World::Home]
 }
 
 fn all_levels() -> Vec<Level> {
@@ -195,7 +211,10 @@ impl ExperimentConfig {
     /// Reads, resolves and checks an experiment.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
         let value = |message| ConfigError::Value { path: path.to_owned(), message };
-        let config: Self = read_toml(path)?;
+        let mut config: Self = read_toml(path)?;
+        for folder in &mut config.evaluate.scenes {
+            *folder = path.with_file_name("").join(&folder);
+        }
         let written: toml::Table = read_toml(path)?;
         if let Some(key) = misplaced(&written) {
             let top = key.rsplit('.').next().unwrap_or(key);
@@ -269,6 +288,16 @@ impl ExperimentConfig {
         distinct("evaluate.methods", &e.methods, |m| m.name())?;
         distinct("evaluate.types", &e.types, |t| t.name())?;
         distinct("evaluate.levels", &e.levels, |l| l.name())?;
+        if e.scenes.is_empty() || !e.worlds.is_empty() {
+            distinct("evaluate.worlds", &e.worlds, |w| w.name())?;
+        }
+        let folders = e.scenes.iter().map(|f| f.file_name().unwrap_or_default().to_string_lossy());
+        let sets: Vec<_> = e.worlds.iter().map(|w| w.name().into()).chain(folders).collect();
+        if let Some((_, twice)) = sets.iter().enumerate().find(|(i, s)| sets[..*i].contains(s)) {
+            return Err(format!(
+                "evaluate: two sets of scenes are called \"{twice}\"; rename a folder, or leave one out"
+            ));
+        }
         for (field, value, max) in [
             ("evaluate.count", e.count, MAX_COUNT),
             ("evaluate.max_expansions", e.max_expansions, 1_000_000_000),
@@ -372,6 +401,9 @@ mod tests {
             (("\"n3p\"", "\"n4p\""), "unknown method"),
             (("\"n3p\"", "\"ha-rs\""), "twice"),
             (("[evaluate]", "[collect]\nseed = 1\n[evaluate]"), "collect.seed"),
+            (("count = 2", "worlds = [\"moon\"]\ncount = 2"), "moon"),
+            (("count = 2", "worlds = []\ncount = 2"), "evaluate.worlds is empty"),
+            (("count = 2", "scenes = [\"a/home\"]\ncount = 2"), "called \"home\""),
             (("[evaluate]", &curve("n3p", 3)), "learning_curve.seed is 3"),
             (("[evaluate]", &curve("ha", 4)), "learning_curve.methods names ha"),
         ] {

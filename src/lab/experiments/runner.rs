@@ -441,8 +441,28 @@ impl Runner<'_> {
         let e = &self.config.evaluate;
         let models = Models::load(&self.model_files()).map_err(|error| self.model_error(error))?;
         let suite_config = e.suite(&e.methods);
-        let vehicle = &self.config.vehicle;
-        let cases = suite::generated(&e.generator, vehicle, &e.types, &e.levels, e.count, e.seed)?;
+        let mut cases = Vec::new();
+        for &world in &e.worlds {
+            let vehicle = &self.config.vehicle;
+            let of_world = suite::of_world(
+                world,
+                &e.generator,
+                vehicle,
+                &e.types,
+                &e.levels,
+                e.count,
+                e.seed,
+            )?;
+            cases.extend(of_world);
+        }
+        for folder in &e.scenes {
+            let found = suite::from_folder(folder, None, suite_config.terms())?;
+            // A record is of all its scenes or of none.
+            if let Some(first) = found.unusable.first() {
+                return Err(SuiteError::NoScenes(first.clone()).into());
+            }
+            cases.extend(found.cases);
+        }
         suite::check(&cases, &models, &suite_config)?;
         Ok((models, cases, suite_config))
     }
@@ -455,8 +475,11 @@ impl Runner<'_> {
         curve: &[CurvePoint],
     ) -> Result<Vec<Row>, ExperimentError> {
         let (e, name) = (&self.config.evaluate, &self.config.name);
-        // The report shows the curve, too.
-        let settings = settings(("evaluate", trained, &self.config.vehicle, e, name, curve));
+        // Files may change; the report shows the curve, too.
+        let files: Vec<_> =
+            cases.iter().filter(|c| !e.generates(&c.set)).map(|c| &c.scene).collect();
+        let vehicle = &self.config.vehicle;
+        let settings = settings(("evaluate", trained, vehicle, e, &files, name, curve));
         let rows_csv = self.path("rows.csv");
         match self.stages.begin("evaluate", &settings, rows_csv.exists())? {
             Todo::Nothing => return Ok(read_csv(&rows_csv)?),
@@ -473,10 +496,9 @@ impl Runner<'_> {
         bar.finish_and_clear();
         rows.extend(new);
         let scenes = format!(
-            "{} generated, {} of each type and level, seed {}; {}",
-            cases.len(),
-            e.count,
-            e.seed,
+            "{}{}; {}",
+            suite::title(cases.len() - files.len(), &e.worlds, e.count, e.seed),
+            if files.is_empty() { String::new() } else { format!("; {} from files", files.len()) },
             match (&self.given.models, &self.given.data) {
                 (Some(models), _) => format!("models from {}", models.display()),
                 (None, Some(data)) => {

@@ -29,8 +29,8 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::lab::dataset::{Sample, Status};
-use crate::lab::toml_file::TomlError;
 use crate::selectors::artefact::{self, ArtefactError};
+use crate::toml_file::TomlError;
 use crate::world::ParkingType;
 use crate::world::generate::GeneratorError;
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::de::DeserializeOwned;
 
 use super::TrainingError;
-use crate::lab::toml_file::read_toml;
+use crate::toml_file::read_toml;
 
 /// Reads a TOML file of settings and checks them; absent ones keep their defaults.
 pub(super) fn read<T: DeserializeOwned>(

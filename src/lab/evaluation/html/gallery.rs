@@ -7,6 +7,7 @@ use std::collections::{HashMap, HashSet};
 
 use serde::{Deserialize, Serialize};
 
+use super::super::table::part_name;
 use super::super::trace::{Trace, mm};
 use crate::curves::{Path, Segment};
 use crate::episode::Case;
@@ -30,7 +31,7 @@ pub fn chosen<'a>(cases: &'a [Case], rows: &[Row]) -> Vec<&'a Case> {
         rows.iter().filter(|r| !r.ok && r.applies()).map(|r| r.scene.as_str()).collect();
     let mut counts: HashMap<_, (usize, usize)> = HashMap::new();
     let is_chosen = |case: &&Case| {
-        let (first, more) = counts.entry((case.kind, case.level)).or_default();
+        let (first, more) = counts.entry((case.set.clone(), case.kind, case.level)).or_default();
         if *first < FIRST {
             *first += 1;
             return true;
@@ -61,7 +62,7 @@ pub struct SceneView {
     /// Its parking type, or `–`.
     #[serde(rename = "type")]
     pub kind: String,
-    /// Its level, or `files`.
+    /// Its level, or its set where that has none.
     pub level: String,
     /// Index of its vehicle.
     pub vehicle: usize,
@@ -186,7 +187,7 @@ impl SceneView {
         Self {
             name: scene.name.clone(),
             kind: case.kind.map_or("–", |k| k.name()).to_owned(),
-            level: case.level.map_or("files", |l| l.name()).to_owned(),
+            level: part_name(&case.set, case.level),
             vehicle,
             start: scene.start,
             goal: scene.goal,

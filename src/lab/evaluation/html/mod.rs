@@ -162,6 +162,7 @@ mod tests {
             scene: generate(&config, &vehicle, kind, level, 77, i),
             kind: Some(kind),
             level: Some(level),
+            set: "home".into(),
         };
         (0..count).map(case).collect()
     }

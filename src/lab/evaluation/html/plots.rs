@@ -6,7 +6,7 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use super::super::metrics::{Group, percentile};
-use super::super::table::{self, figures, kind_name};
+use super::super::table::{self, figures, kind_name, part_name};
 use super::tables::paper_ratio;
 use super::{escape, family};
 use crate::episode::Row;
@@ -132,7 +132,9 @@ fn values(
 ) -> Plot {
     let mark = |g: &Group, method: &str| {
         let mine = rows.iter().filter(|r| {
-            (r.level, r.kind) == (g.level, g.kind) && r.method == method && r.applies()
+            (&r.set, r.level, r.kind) == (&g.set, g.level, g.kind)
+                && r.method == method
+                && r.applies()
         });
         let (solved, failed): (Vec<&Row>, Vec<&Row>) = mine.partition(|r| r.ok);
         let sorted = |rows: Vec<&Row>| {
@@ -158,7 +160,7 @@ impl Plot {
         mark: impl Fn(&Group, &str) -> Mark,
     ) -> Self {
         let panel = |g: &Group| Panel {
-            level: g.level.map_or("files".to_owned(), |l| l.to_string()),
+            level: part_name(&g.set, g.level),
             kind: kind_name(g.kind),
             lines: methods.iter().map(|m| ((*m).to_owned(), mark(g, m))).collect(),
         };

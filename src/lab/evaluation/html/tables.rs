@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::super::metrics::{Group, Interval, Summary, Totals};
 use super::super::quality::{self, Quality};
-use super::super::table::{self, PaperRow, figures, kind_name, level_title, numbers};
+use super::super::table::{self, PaperRow, figures, kind_name, numbers, part_name, part_title};
 use super::family;
 use crate::episode::Row;
 use crate::n3p::Method;
@@ -111,20 +111,20 @@ pub struct Line {
     pub interval: String,
 }
 
-/// One table per level; `methods` has all methods of the run, so that one that is absent
+/// One table per set and level; `methods` has all methods of the run, so that one that is absent
 /// from a type leaves a line of dashes.
 pub fn levels(groups: &[Group], methods: &[&str]) -> Vec<LevelTable> {
     let paper = table::paper_rows();
-    let of_level = |level| {
-        let groups = groups.iter().filter(|g| g.level == level);
+    let of_part = |part: table::Part| {
+        let groups = groups.iter().filter(|g| table::is_of(g, part));
         let groups = groups.map(|g| TypeGroup {
             kind: kind_name(g.kind),
             scenes: g.summaries.iter().map(|s| s.scenes).max().unwrap_or(0),
             lines: methods.iter().map(|m| line(g, m, &paper)).collect(),
         });
-        LevelTable { title: level_title(level), groups: groups.collect() }
+        LevelTable { title: part_title(part.0, part.1), groups: groups.collect() }
     };
-    table::levels(groups).into_iter().map(of_level).collect()
+    table::parts(groups).into_iter().map(of_part).collect()
 }
 
 fn line(group: &Group, method: &str, paper: &[PaperRow]) -> Line {
@@ -171,7 +171,7 @@ pub fn speed_ups(groups: &[Group]) -> Vec<SpeedLine> {
             let ratio = s.speed_up.as_ref();
             let saved = ratio.map(|u| 100.0 * (1.0 - 1.0 / u.ratio)).filter(|&s| s >= 0.0);
             lines.push(SpeedLine {
-                level: g.level.map_or("files".to_owned(), |l| l.to_string()),
+                level: part_name(&g.set, g.level),
                 kind: kind_name(g.kind),
                 first: i == 0,
                 method: s.method.clone(),
@@ -257,7 +257,7 @@ pub fn failures(rows: &[Row], scenes: &HashMap<&str, usize>, methods: &[String])
     let failure = |row: &Row| Failure {
         scene: row.scene.clone(),
         kind: kind_name(row.kind),
-        level: row.level.map_or("files".to_owned(), |l| l.to_string()),
+        level: part_name(&row.set, row.level),
         method: row.method.clone(),
         why: row.why(),
         shown: scenes
