@@ -156,7 +156,7 @@ fn number(v: f64) -> String {
 mod tests {
     use super::super::MlpConfig;
     use super::super::curve::EpochLoss;
-    use super::super::knn::{KnnKindLog, KnnLog, LeaveOneOut};
+    use super::super::knn::{KnnConfig, KnnKindLog, KnnLog, LeaveOneOut};
     use super::super::mlp::TrainingLog;
     use super::*;
     use crate::lab::dataset::CollectConfig;
