@@ -576,7 +576,7 @@ fn one_network_learns_from_several_vehicles_reproducibly() {
     let sets = [part(1.86), part(1.70)];
     let train = |name: &str| {
         let path = dir.path().join(name);
-        let log = training::fleet::train(&sets, &quick(3), &path).unwrap();
+        let log = training::fleet::train(&sets, &quick(3), &NO_WORLDS, &path).unwrap();
         (log, std::fs::read(&path).unwrap())
     };
     let (log, bytes) = train("a.safetensors");

@@ -99,9 +99,12 @@ struct FleetArgs {
     /// Settings of the networks' training, a TOML file; the defaults when omitted
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Seed of weights, shuffling and validation rows; overrides the settings
+    /// Seed of worlds, weights, shuffling and validation rows; overrides the settings
     #[arg(long, value_name = "S")]
     seed: Option<u64>,
+    /// Generated worlds of each type in which manoeuvres are learnt, too; 0 for none
+    #[arg(long, value_name = "N", default_value_t = KnnConfig::default().worlds)]
+    worlds: u32,
 }
 
 #[derive(Args)]
@@ -222,6 +225,8 @@ fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
 
 fn fleet(args: &FleetArgs) -> anyhow::Result<ExitCode> {
     let config = mlp_config(args.config.as_deref(), args.seed)?;
+    let worlds = KnnConfig { worlds: args.worlds, seed: config.seed };
+    worlds.validate().or_bad_input()?;
     artefact::check_writable(&args.out).or_bad_input()?;
     let sets = args.data.iter().map(|folder| Dataset::read(folder, None).or_bad_input());
     let sets = sets.collect::<anyhow::Result<Vec<_>>>()?;
@@ -247,7 +252,7 @@ fn fleet(args: &FleetArgs) -> anyhow::Result<ExitCode> {
             return Err(bad(format!("its vehicle is that of {other}; give one set each")).into());
         }
     }
-    let log = training::fleet::train(&sets, &config, &args.out).map_err(|e| {
+    let log = training::fleet::train(&sets, &config, &worlds, &args.out).map_err(|e| {
         if e.is_bad_input() { BadInput(e.to_string()).into() } else { anyhow::Error::from(e) }
     })?;
     for k in &log.kinds {

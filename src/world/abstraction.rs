@@ -43,6 +43,8 @@ const TOUCH: f64 = 1e-6;
 /// The farthest a bay's lane may begin beyond its usual boundary, of the bay's depth: a car parked
 /// at the bottom of a bay 9 m deep, or pillars and kerbs that reach as far into the lane.
 const MAX_SHIFT: f64 = 4.0 / 5.5;
+/// The same for the lane beside a parallel spot, of the spot's depth.
+const KERB: f64 = 0.3 / 2.4;
 /// The same where only what stands out farthest in the row is asked for.
 const USUAL_SHIFT: f64 = 1.0 / 5.5;
 /// Farther out the lane is looked for in steps, of the bay's depth.
@@ -127,11 +129,12 @@ impl Surroundings {
     /// [`abstractions`] among these obstacles.
     pub fn abstractions(&self, kind: ParkingType, grid: &Grid) -> Vec<Abstraction> {
         let mut found = self.lanes(kind, grid);
-        // No straight leads from a lane farther out into a parallel spot: no cell's manoeuvre fits.
+        // No straight leads from a lane farther out into a parallel spot: a cell's manoeuvre fits where
+        // it is hardly farther out, as kerbs are nearer to some cars than to others.
         if found.is_empty() && kind.is_bay() {
             found = self.lanes_farther_out(kind, grid);
         }
-        found.retain(|lane| lane.shift == 0.0 || kind.is_bay());
+        found.retain(|lane| kind.is_bay() || lane.shift <= KERB * grid.parallel_depth);
         found
     }
 

@@ -7,11 +7,13 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::curve::{self, EpochLoss};
+use super::knn::KnnConfig;
 use super::library::{Source, condense};
 use super::mlp::{LEAST_SAMPLES, split};
 use super::quality::{Errors, Reach, errors, reach};
 use super::regression::{Rows, Trainable, fit, predictions};
 use super::targets::{self, Example};
+use super::worlds::Worlds;
 use super::{MlpConfig, TrainingError, card, solved, write_beside};
 use crate::geometry::Pose;
 use crate::lab::dataset::{Dataset, Sample};
@@ -31,6 +33,8 @@ pub struct FleetLog {
     pub data_sha256: Vec<String>,
     /// Settings of the networks' training.
     pub config: MlpConfig,
+    /// The worlds that manoeuvres were learnt in.
+    pub worlds: KnnConfig,
     /// Parking type by parking type.
     pub kinds: Vec<FleetKindLog>,
     /// Size of the model, bytes.
@@ -61,22 +65,35 @@ pub struct FleetKindLog {
 }
 
 /// Condenses the samples of `sets`, one of each vehicle and all of one grid, into the model `out`,
-/// and trains its networks; log, model card and loss curves are written beside it.
+/// learns further manoeuvres in `worlds`, and trains its networks; log, model card and loss curves are written beside it.
 ///
 /// # Panics
 ///
 /// Without a data set.
-pub fn train(sets: &[Dataset], config: &MlpConfig, out: &Path) -> Result<FleetLog, TrainingError> {
+pub fn train(
+    sets: &[Dataset],
+    config: &MlpConfig,
+    worlds: &KnnConfig,
+    out: &Path,
+) -> Result<FleetLog, TrainingError> {
     config.validate()?;
+    worlds.validate()?;
     let mut solved = Vec::new();
     for kind in ParkingType::ALL {
         solved.push((kind, solved_of(sets, kind)?));
     }
+    let progress = worlds.progress(ParkingType::ALL.len());
+    let learnt_in = Worlds { count: worlds.worlds, seed: worlds.seed, progress: &progress };
     let condensed: Vec<UnitManoeuvres> = std::thread::scope(|scope| {
-        let condense = |(kind, of_sets)| scope.spawn(move || manoeuvres(sets, kind, of_sets));
+        let learn = |(kind, of_sets): (ParkingType, &Vec<Vec<&Sample>>)| {
+            let sources = sources(sets, of_sets);
+            learnt_in.learn(kind, condense(kind, &sources), &sources)
+        };
+        let condense = |(kind, of_sets)| scope.spawn(move || learn((kind, of_sets)));
         let running: Vec<_> = solved.iter().map(|(k, of_sets)| condense((*k, of_sets))).collect();
         running.into_iter().map(|r| r.join().expect("condensing does not panic")).collect()
     });
+    progress.finish_and_clear();
     let (mut scaling, mut networks, mut logs) = (Vec::new(), Vec::new(), Vec::new());
     for ((kind, of_sets), manoeuvres) in solved.iter().zip(&condensed) {
         let learnt = learn(sets, *kind, of_sets, config, manoeuvres.len())?;
@@ -100,8 +117,8 @@ pub fn train(sets: &[Dataset], config: &MlpConfig, out: &Path) -> Result<FleetLo
     let bytes = fleet::encode(&header, &condensed, &networks);
     artefact::write(out, &bytes)?;
     let FleetHeader { fleet, data_sha256, .. } = header;
-    let (config, bytes) = (config.clone(), bytes.len());
-    let log = FleetLog { fleet, data_sha256, config, kinds: logs, bytes };
+    let (config, worlds, bytes) = (config.clone(), *worlds, bytes.len());
+    let log = FleetLog { fleet, data_sha256, config, worlds, kinds: logs, bytes };
     write_beside(out, &log, card::fleet(out, &log))?;
     for FleetKindLog { kind, losses, .. } in &log.kinds {
         let picture = curve::svg(&format!("fleet, {kind}: loss"), losses)?;
@@ -125,13 +142,13 @@ fn solved_of(sets: &[Dataset], kind: ParkingType) -> Result<Vec<Vec<&Sample>>, T
     Ok(all)
 }
 
-/// The manoeuvres that serve all samples.
-fn manoeuvres(sets: &[Dataset], kind: ParkingType, solved: &[Vec<&Sample>]) -> UnitManoeuvres {
-    let sources = sets.iter().zip(solved).map(|(set, solved)| {
+/// The samples of every vehicle, lengths in turning radii.
+fn sources<'a>(sets: &'a [Dataset], solved: &'a [Vec<&'a Sample>]) -> Vec<Source<'a>> {
+    let source = |(set, solved): (&'a Dataset, &'a Vec<&'a Sample>)| {
         let unit = set.metadata.vehicle.turning_radius();
         Source { metadata: &set.metadata, solved, unit }
-    });
-    condense(kind, &sources.collect::<Vec<_>>())
+    };
+    sets.iter().zip(solved).map(source).collect()
 }
 
 /// A network and how it was learnt.

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use indicatif::ProgressBar;
 use serde::{Deserialize, Serialize};
 
 pub use super::leave_one_out::LeaveOneOut;
@@ -37,6 +38,11 @@ impl KnnConfig {
     pub fn validate(&self) -> Result<(), TrainingError> {
         let within = self.worlds <= 1_000_000;
         settings::check("worlds", within, self.worlds.to_string(), "0 to 1000000")
+    }
+
+    /// A bar for the worlds of so many parking types.
+    pub(super) fn progress(&self, kinds: usize) -> ProgressBar {
+        progress::bar(2 * u64::from(self.worlds) * kinds as u64, "worlds")
     }
 }
 
@@ -98,7 +104,7 @@ pub fn train(
         known.push((kind, solved));
     }
     let heading_radius = metadata.vehicle.turning_radius() / 2.0;
-    let progress = progress::bar(2 * u64::from(config.worlds) * kinds.len() as u64, "worlds");
+    let progress = config.progress(kinds.len());
     let worlds = Worlds { count: config.worlds, seed: config.seed, progress: &progress };
     let learnt: Vec<_> = std::thread::scope(|scope| {
         let learn = |(kind, solved): &(ParkingType, Vec<&Sample>)| {

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::{VERSION, metrics, name};
+use super::{VERSION, in_worlds, metrics, name};
 use crate::lab::training::fleet::FleetLog;
 use crate::selectors::UNIT_NAMES;
 use crate::selectors::fleet::UNIT_LAYERS;
@@ -34,6 +34,7 @@ pub(in crate::lab::training) fn fleet(out: &Path, log: &FleetLog) -> String {
         let _ = writeln!(kinds, "| {kind} | {counts} | {epochs} |");
         rows.push((kind, k.validation_rows, k.validation, k.reach));
     }
+    let learnt = in_worlds(&log.worlds);
     let settings = toml::to_string(&log.config).expect("settings are plain data");
     let layers = UNIT_LAYERS.map(|width| width.to_string()).join(" → ");
     let inputs = UNIT_NAMES.map(|name| format!("`{name}`")).join(", ");
@@ -71,7 +72,7 @@ Metres and radians; the last column begins the SHA-256 of the vehicle's data set
 | type | solved samples | manoeuvres | rows the network learnt | epoch kept |
 |---|--:|--:|--:|---|
 {kinds}
-Settings of the networks, as a file for `n3p-train fleet --config FILE`:
+{learnt} Settings of the networks, as a file for `n3p-train fleet --config FILE`:
 
 ```toml
 {settings}```

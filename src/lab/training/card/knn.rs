@@ -3,9 +3,9 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::{INPUTS, VERSION, data, metrics, name, spots, vehicle};
+use super::{INPUTS, VERSION, data, in_worlds, metrics, name, spots, vehicle};
 use crate::lab::dataset::Metadata;
-use crate::lab::training::knn::{KnnConfig, KnnKindLog, KnnLog};
+use crate::lab::training::knn::{KnnKindLog, KnnLog};
 
 /// The card of the `knn.bin` in `out`.
 pub(in crate::lab::training) fn knn(out: &Path, metadata: &Metadata, log: &KnnLog) -> String {
@@ -22,15 +22,7 @@ pub(in crate::lab::training) fn knn(out: &Path, metadata: &Metadata, log: &KnnLo
         let (occupied, cells) = (k.occupied_cells, k.cells);
         let _ = writeln!(stored, "| {kind} | {samples} | {occupied} of {cells} | {manoeuvres} |");
     }
-    let KnnConfig { worlds, seed } = log.config;
-    let learnt = match worlds {
-        0 => "The manoeuvres are those that serve many rows.".to_owned(),
-        _ => format!(
-            "The manoeuvres are those that serve the rows\nand {worlds} generated worlds of each type \
-             (seed {seed}), their sizes drawn far wider than those of any\nlevel; what is used most \
-             comes first."
-        ),
-    };
+    let learnt = in_worlds(&log.config);
     let judged =
         |k: &KnnKindLog| k.leave_one_out.map(|l| (k.kind, l.reach.rows, l.errors, l.reach));
     let metrics = metrics(&log.kinds.iter().filter_map(judged).collect::<Vec<_>>());

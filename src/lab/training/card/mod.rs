@@ -14,6 +14,7 @@ pub(super) use fleet::fleet;
 pub(super) use knn::knn;
 pub(super) use mlp::mlp;
 
+use super::knn::KnnConfig;
 use super::quality::{Errors, Reach};
 use crate::lab::dataset::Metadata;
 use crate::world::ParkingType;
@@ -87,6 +88,17 @@ stands for none at all.
     )
 }
 
+/// What manoeuvres serve.
+fn in_worlds(KnnConfig { worlds, seed }: &KnnConfig) -> String {
+    match worlds {
+        0 => "The manoeuvres are those that serve many rows.".to_owned(),
+        _ => format!(
+            "The manoeuvres are those that serve\n{worlds} generated worlds of each type (seed {seed}), \
+             their sizes drawn far wider than those of any level;\nwhat is used most comes first."
+        ),
+    }
+}
+
 /// Tables of errors, of so many rows, and reach.
 fn metrics(kinds: &[(ParkingType, usize, Errors, Reach)]) -> String {
     if kinds.is_empty() {
@@ -156,7 +168,7 @@ fn number(v: f64) -> String {
 mod tests {
     use super::super::MlpConfig;
     use super::super::curve::EpochLoss;
-    use super::super::knn::{KnnConfig, KnnKindLog, KnnLog, LeaveOneOut};
+    use super::super::knn::{KnnKindLog, KnnLog, LeaveOneOut};
     use super::super::mlp::TrainingLog;
     use super::*;
     use crate::lab::dataset::CollectConfig;
