@@ -26,7 +26,7 @@ use crate::selectors::{Features, PoseSelector};
 
 mod known;
 
-use known::{ENOUGH, Known, Prepared};
+use known::{ENOUGH, Known, Prepared, most_changes};
 
 /// Expansions that the paper's two legs may spend, so that a pose just beside the feasible
 /// ones does not use up what the full search needs.
@@ -40,7 +40,7 @@ const AT_THE_SPOT: f64 = 1.0;
 const DOUBTFUL: f64 = 2.0;
 const SECOND_SEARCH: usize = 1500;
 /// The same by a spot that no cell of the model stands for: its manoeuvres may not be made for it.
-const UNUSUAL_SEARCH: usize = 20_000;
+const UNUSUAL_SEARCH: usize = 3_000;
 
 /// What `n3p` tries before it searches. The paper's rows have no such settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -264,7 +264,8 @@ impl GuidedPlanner {
         let mut refined = self.hars.refine(problem, goal, path.clone(), Effort::Usual, 0, left);
         let model = self.hars.cost(&problem.vehicle);
         let cost = |path: &Path| model.path(&problem.vehicle, &path.segments);
-        let doubtful = refined.direction_changes() > 2 && cost(&refined) > DOUBTFUL * least;
+        let doubtful = refined.direction_changes() > most_changes(problem.kind)
+            && cost(&refined) > DOUBTFUL * least;
         let is_dear = self.is_unusually_dear(problem, goal, cost(&refined), least);
         if doubtful || is_dear {
             let share = if is_dear { UNUSUAL_SEARCH } else { SECOND_SEARCH }.min(*left);

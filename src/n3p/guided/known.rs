@@ -59,7 +59,7 @@ pub(super) struct Known {
 }
 
 /// Changes of gear that a spot takes at most as a rule.
-fn most_changes(kind: Option<ParkingType>) -> usize {
+pub(super) fn most_changes(kind: Option<ParkingType>) -> usize {
     if kind == Some(ParkingType::Parallel) { TO_AND_FRO } else { INTO_A_BAY }
 }
 
