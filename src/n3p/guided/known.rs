@@ -23,8 +23,10 @@ const FIRST_TRIES: usize = 16;
 /// passes something near on its way.
 const USUAL: f64 = 1.3;
 pub(super) const ENOUGH: f64 = 1.1;
-/// What costs more than this many times the estimate is looked at again by any spot.
+/// What costs more than this many times the estimate is looked at again, the second by a spot that no
+/// usual cell stands for.
 const DEAR: f64 = 3.0;
+const DEAR_BY_UNUSUAL: f64 = 2.0;
 /// Changes of gear that a parallel spot may take more than the curve through empty space.
 const TO_AND_FRO: usize = 4;
 /// Changes of gear that a bay takes as a rule.
@@ -202,9 +204,9 @@ impl GuidedPlanner {
     /// curve through empty space does.
     pub(super) fn is_usual(&mut self, problem: &Problem, goal: &GoalSet, known: &Known) -> bool {
         known.cost <= USUAL * known.least
-            || (known.cost <= DEAR * known.least
-                && known.path.direction_changes() <= most_changes(problem.kind)
-                && !self.is_unusual(problem))
+            || (known.path.direction_changes() <= most_changes(problem.kind)
+                && (known.cost <= DEAR_BY_UNUSUAL * known.least
+                    || known.cost <= DEAR * known.least && !self.is_unusual(problem)))
             || known.cost <= ENOUGH * self.hars.lower_bound(problem, goal)
     }
 
@@ -216,7 +218,7 @@ impl GuidedPlanner {
         cost: f64,
         least: f64,
     ) -> bool {
-        cost > USUAL * least
+        cost > DEAR_BY_UNUSUAL * least
             && cost > ENOUGH * self.hars.lower_bound(problem, goal)
             && self.is_unusual(problem)
     }
