@@ -261,7 +261,7 @@ impl GuidedPlanner {
         }
         let Known { path, mut guidance, least, .. } = known;
         let before = *left;
-        let mut refined = self.hars.refine(problem, goal, path.clone(), Effort::Usual, 0, left);
+        let mut refined = self.hars.refine(problem, goal, path.clone(), Effort::Usual, None, left);
         let model = self.hars.cost(&problem.vehicle);
         let cost = |path: &Path| model.path(&problem.vehicle, &path.segments);
         let doubtful = refined.direction_changes() > most_changes(problem.kind)
@@ -293,7 +293,7 @@ impl GuidedPlanner {
         left: &mut usize,
     ) -> (Path, Guidance) {
         let (goal, before) = (self.hars.goal_set(problem), *left);
-        let refined = self.hars.refine(problem, &goal, path.clone(), Effort::Most, 0, left);
+        let refined = self.hars.refine(problem, &goal, path.clone(), Effort::Most, None, left);
         let guidance = if refined == path { guidance } else { Self::anew(before - *left) };
         (refined, guidance)
     }
@@ -315,7 +315,7 @@ impl GuidedPlanner {
         spent: usize,
         left: &mut usize,
     ) -> Path {
-        let refined = self.hars.refine(problem, goal, path, effort, spent, left);
+        let refined = self.hars.refine(problem, goal, path, effort, Some(spent), left);
         if effort == Effort::First || refined.direction_changes() <= 2 || !self.is_unusual(problem)
         {
             return refined;
@@ -325,7 +325,7 @@ impl GuidedPlanner {
         let found = self.hars.search_aside(problem, problem.start, goal, &mut spend);
         *left -= share - spend;
         let Ok(leg) = found else { return refined };
-        let found = self.hars.refine(problem, goal, leg.path, effort, 0, left);
+        let found = self.hars.refine(problem, goal, leg.path, effort, Some(0), left);
         let model = self.hars.cost(&problem.vehicle);
         let cost = |path: &Path| model.path(&problem.vehicle, &path.segments);
         if cost(&found) < cost(&refined) { found } else { refined }

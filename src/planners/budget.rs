@@ -68,15 +68,16 @@ impl Effort {
         }
     }
 
-    /// Expansions, of `left`, for something better than a path that took `spent`.
-    pub(crate) fn patience(self, spent: usize, left: usize) -> usize {
-        /// For what was not searched for: mostly it is as good as what many searches found elsewhere.
+    /// Expansions, of `left`, for something better than a path that took `spent`, or than one that was
+    /// known: what many searches found elsewhere is good as a rule.
+    pub(crate) fn patience(self, spent: Option<usize>, left: usize) -> usize {
         const KNOWN: usize = 120;
         const LEAST: usize = 400;
         match self {
             Effort::First => 0,
-            Effort::Usual if spent == 0 => KNOWN.min(left),
-            Effort::Usual => LEAST.max(spent.saturating_mul(2)).min(left),
+            Effort::Usual => {
+                spent.map_or(KNOWN, |spent| LEAST.max(spent.saturating_mul(2))).min(left)
+            }
             Effort::Most => left / 2,
         }
     }

@@ -299,7 +299,7 @@ impl HybridAStar {
         lower_bound(problem.start, goal, &problem.vehicle, &model, &mut self.words)
     }
 
-    /// `path`, found with `spent` expansions, or a better one: its corners are cut, and where it still
+    /// `path`, found with `spent` expansions or known without a search, or a better one: its corners are cut, and where it still
     /// costs much more than it must, a search looks for something cheaper, as long as the `effort`
     /// says.
     pub(crate) fn refine(
@@ -308,7 +308,7 @@ impl HybridAStar {
         goal: &GoalSet,
         path: Path,
         effort: Effort,
-        spent: usize,
+        spent: Option<usize>,
         left: &mut usize,
     ) -> Path {
         let path = match effort {
@@ -324,7 +324,7 @@ impl HybridAStar {
         }
         let Ok(config) = self.config.for_search(&problem.vehicle) else { return path };
         let mut domain = config.domains(problem, problem.start, goal.pose)[0];
-        if spent > 0 {
+        if spent.is_some_and(|spent| spent > 0) {
             // Half a cell aside of the lattice that the path comes from: what that one misses is found.
             domain = domain.inflated(config.resolutions[0].cell / 2.0);
         }
@@ -418,7 +418,8 @@ impl Planner for HybridAStar {
         let leg = self.leg(problem, problem.start, &goal, &mut left);
         let spent = budget.max_expansions - left;
         let effort = budget.effort;
-        let path = leg.map(|leg| self.refine(problem, &goal, leg.path, effort, spent, &mut left));
+        let path =
+            leg.map(|leg| self.refine(problem, &goal, leg.path, effort, Some(spent), &mut left));
         let expansions = budget.max_expansions - left;
         match path {
             Ok(path) => PlanResult::certified(problem, path, expansions),
