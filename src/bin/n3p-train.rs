@@ -83,9 +83,9 @@ struct KnnArgs {
     /// Generated worlds of each type in which manoeuvres are learnt, too; 0 for none
     #[arg(long, value_name = "N", default_value_t = KnnConfig::default().worlds)]
     worlds: u32,
-    /// Seed of the worlds
-    #[arg(long, value_name = "S", default_value_t = KnnConfig::default().seed)]
-    seed: u64,
+    /// Seed of the worlds; that of the data set when omitted
+    #[arg(long, value_name = "S")]
+    seed: Option<u64>,
 }
 
 #[derive(Args)]
@@ -206,10 +206,11 @@ fn mlp_config(file: Option<&Path>, seed: Option<u64>) -> anyhow::Result<MlpConfi
 }
 
 fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
-    let config = KnnConfig { worlds: args.worlds, seed: args.seed };
-    config.validate().or_bad_input()?;
+    KnnConfig { worlds: args.worlds, ..KnnConfig::default() }.validate().or_bad_input()?;
     artefact::check_writable(&args.out).or_bad_input()?;
     let (data, kinds) = read(&args.common)?;
+    let seed = args.seed.unwrap_or(data.metadata.seed);
+    let config = KnnConfig { worlds: args.worlds, seed };
     let begin = Instant::now();
     let log = training::knn::train(&data.metadata, &data.samples, &kinds, &config, &args.out)
         .map_err(|e| exit_code(e, &args.common.data))?;

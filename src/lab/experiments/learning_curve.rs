@@ -11,6 +11,7 @@ use crate::lab::evaluation::learning_curve::Part;
 use crate::lab::evaluation::suite;
 use crate::lab::progress;
 use crate::lab::training;
+use crate::lab::training::knn::KnnConfig;
 use crate::n3p::Models;
 
 /// Trains on `subset` of `data`, keeping the models in `folder`, and plans with them.
@@ -24,7 +25,9 @@ pub(super) fn points(
     let part = subset.of(data);
     let kinds = &config.evaluate.types;
     let knn = folder.join("knn.bin");
-    training::knn::train(&part.metadata, &part.samples, kinds, &config.train.knn, &knn)?;
+    // What data alone is worth.
+    let no_worlds = KnnConfig { worlds: 0, ..config.train.knn };
+    training::knn::train(&part.metadata, &part.samples, kinds, &no_worlds, &knn)?;
     let mut files = vec![knn];
     if curve.needs_mlp() {
         for &kind in kinds {
