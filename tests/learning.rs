@@ -264,6 +264,20 @@ fn manoeuvres_are_learnt_in_worlds() {
     let log: training::knn::KnnLog =
         serde_json::from_slice(&std::fs::read(training::log_path(&path)).unwrap()).unwrap();
     assert_eq!(log.config, config);
+    // So do those that drive smaller cars.
+    let small = Metadata {
+        vehicle: Vehicle {
+            length: 4.0,
+            width: 1.66,
+            wheelbase: 2.4,
+            rear_overhang: 0.7,
+            ..metadata().vehicle
+        },
+        ..metadata()
+    };
+    training::knn::train(&small, &few, &[KIND], &config, &path).unwrap();
+    let of_small = KnnSelector::load(&path).unwrap().manoeuvres(KIND, &small.vehicle);
+    assert!(of_small.len() > 5, "{}", of_small.len());
     let error = training::knn::train(
         &metadata(),
         &few,

@@ -114,7 +114,7 @@ impl Contact {
         }
         let step = Self::WAY_OUT * vehicle.scale();
         let steps = (vehicle.length / step) as u32;
-        let usual = Problem::MARGIN * vehicle.scale();
+        let usual = Problem::usual_margin(vehicle);
         let mut ways = Vec::new();
         for gear in [Gear::Forward, Gear::Backward] {
             for share in Self::CURVATURES {

@@ -196,6 +196,11 @@ impl Problem {
     /// than what a car is made of can be mistaken for.
     pub const MAX_CONTACT: f64 = 0.2;
 
+    /// [`Problem::MARGIN`] for a vehicle of this size, metres.
+    pub fn usual_margin(vehicle: &Vehicle) -> f64 {
+        Self::MARGIN * vehicle.scale()
+    }
+
     /// The problem of a scene, with the usual [`Problem::MARGIN`].
     pub fn new(scene: &Scene) -> Result<Problem, ProblemError> {
         Self::with_margin(scene, Self::MARGIN)
@@ -280,7 +285,7 @@ impl Problem {
         bounds: Option<[Vec2; 4]>,
         terms: Terms,
     ) -> Result<Problem, ProblemError> {
-        let least = Self::MARGIN * vehicle.scale();
+        let least = Self::usual_margin(&vehicle);
         let asked = terms.margin;
         let mut margin = if asked > Self::MARGIN { asked.max(least) } else { least };
         let mut collision = CollisionWorld::new(&obstacles, bounds, &vehicle, margin);

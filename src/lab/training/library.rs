@@ -47,7 +47,7 @@ impl Source<'_> {
         Library::new(
             &own,
             vehicle,
-            vehicle.footprint(Problem::MARGIN),
+            vehicle.footprint(Problem::usual_margin(vehicle)),
             &planner.cost.scaled(vehicle.scale()),
         )
     }
@@ -142,7 +142,7 @@ fn for_each_cell(
     mut each: impl FnMut(&mut Problem, &[&Sample]),
 ) {
     let Metadata { vehicle, grid, .. } = metadata;
-    let footprint = vehicle.footprint(Problem::MARGIN);
+    let footprint = vehicle.footprint(Problem::usual_margin(vehicle));
     let goal = grid.goal(kind, vehicle);
     let grid = grid.with_lane_behind(metadata.start_behind);
     for of_cell in samples.chunk_by(|a, b| a.cell_index == b.cell_index) {
