@@ -26,7 +26,7 @@ use crate::selectors::{Features, PoseSelector};
 
 mod known;
 
-use known::{ENOUGH, Known, Prepared, most_changes};
+use known::{ENOUGH, Known, Prepared, USUAL, most_changes};
 
 /// Expansions that the paper's two legs may spend, so that a pose just beside the feasible
 /// ones does not use up what the full search needs.
@@ -252,7 +252,8 @@ impl GuidedPlanner {
         }
         let is_usual = self.is_usual(problem, goal, &known);
         let apart = problem.start.distance(problem.goal) / problem.vehicle.length;
-        let may_go_on = apart < AT_THE_SPOT || (!is_usual && apart < NEAR_GOAL);
+        let is_cheap = known.cost <= USUAL * known.least;
+        let may_go_on = apart < AT_THE_SPOT || (!is_cheap && apart < NEAR_GOAL);
         if may_go_on && known.cost > ENOUGH * self.hars.lower_bound(problem, goal) {
             known = self.or_rest(problem, known);
         }

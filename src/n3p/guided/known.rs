@@ -1,6 +1,6 @@
 //! What `n3p` knows without a search: the manoeuvres of its library, and what they say about a plan.
 
-use super::GuidedPlanner;
+use super::{AT_THE_SPOT, GuidedPlanner};
 use crate::curves::{Path, Segment};
 use crate::planners::cost::CostModel;
 use crate::planners::hybrid_astar::{GoalSet, Leg};
@@ -21,7 +21,7 @@ const FIRST_TRIES: usize = 16;
 /// A plan that costs at most so many times the estimate of the best known one (which knows nothing
 /// of joints and obstacles) or the least cost through empty space is taken as it is, unless it
 /// passes something near on its way.
-const USUAL: f64 = 1.3;
+pub(super) const USUAL: f64 = 1.3;
 pub(super) const ENOUGH: f64 = 1.1;
 /// What costs more than this many times the estimate is looked at again, the second by a spot that no
 /// usual cell stands for.
@@ -200,11 +200,12 @@ impl GuidedPlanner {
     }
 
     /// Whether a plan costs no more than usual: what is known of the spot says what it takes, by a usual
-    /// one within wide limits, as manoeuvres for it were learnt in many worlds; where that is little, the
-    /// curve through empty space does.
+    /// one within wide limits, as manoeuvres for it were learnt in many worlds (but who stands at the spot
+    /// may be within one that was not); where that is little, the curve through empty space does.
     pub(super) fn is_usual(&mut self, problem: &Problem, goal: &GoalSet, known: &Known) -> bool {
         known.cost <= USUAL * known.least
-            || (known.path.direction_changes() <= most_changes(problem.kind)
+            || (problem.start.distance(problem.goal) >= AT_THE_SPOT * problem.vehicle.length
+                && known.path.direction_changes() <= most_changes(problem.kind)
                 && (known.cost <= DEAR_BY_UNUSUAL * known.least
                     || known.cost <= DEAR * known.least && !self.is_unusual(problem)))
             || known.cost <= ENOUGH * self.hars.lower_bound(problem, goal)
@@ -237,15 +238,17 @@ impl GuidedPlanner {
     /// What is known, or the rest of the manoeuvre that the car stands in where that costs less: who
     /// replans on the way goes on.
     pub(super) fn or_rest(&mut self, problem: &Problem, known: Known) -> Known {
-        let library = self.libraries.first().map(|p| &p.library).filter(|l| l.fits(problem));
-        let Some(library) = library else { return known };
+        let prepared = self.libraries.first().filter(|p| p.library.fits(problem));
+        let Some(Prepared { library, rare, .. }) = prepared else { return known };
         let model = self.hars.cost(&problem.vehicle);
-        match library.rest(problem, &model, known.cost) {
-            Some((path, cost)) => {
-                let guidance = Guidance { preparatory: None, route: Route::Library };
-                Known { path, cost, guidance, least: known.least }
+        [library, rare].into_iter().fold(known, |known, library| {
+            match library.rest(problem, &model, known.cost) {
+                Some((path, cost)) => {
+                    let guidance = Guidance { preparatory: None, route: Route::Library };
+                    Known { path, cost, guidance, ..known }
+                }
+                None => known,
             }
-            None => known,
-        }
+        })
     }
 }
