@@ -147,6 +147,8 @@ fn most_spots_are_tight_on_both_sides() {
 
 #[test]
 fn start_and_goal_are_free() {
+    const WALL: f64 = 0.3;
+    let mut places = [0, 0];
     for_each(|_, _, scene, what| {
         scene.validate(Path::new(&scene.name)).unwrap();
         let (start, goal) = (footprint(scene, scene.start), footprint(scene, scene.goal));
@@ -159,10 +161,15 @@ fn start_and_goal_are_free() {
         for pose in [scene.start, scene.goal] {
             assert!(bounds.contains(pose.position()), "{what}: {pose:?} out of bounds");
         }
-        let start = scene.start;
-        assert!((-14.0..=-7.0).contains(&start.x), "{what}: {start:?}");
+        // As the paper has it: within three lengths of the car, and before the dead end.
+        let (start, reach) = (scene.start, 3.0 * Vehicle::default().length);
+        let last = reach.min(max_x - 2.0 * WALL);
+        assert!((-reach - TOL..=last + TOL).contains(&start.x), "{what}: {start:?}");
+        places[usize::from(start.x > 0.0)] += 1;
         assert!(start.heading.abs() <= std::f64::consts::FRAC_PI_6, "{what}: {start:?}");
     });
+    let [before, beyond] = places;
+    assert!(beyond * 10 > before, "{before} start before the spot, {beyond} beyond it");
 }
 
 #[test]
@@ -249,8 +256,11 @@ fn the_example_scenes_come_out_again() {
         let recorded =
             Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/scenes/{kind}.json"));
         let recorded = Scene::read(&recorded).unwrap();
-        let again =
-            generate(&GeneratorConfig::default(), &Vehicle::default(), kind, level, 7, index);
+        // They are from when all cars started 7 to 14 m behind the spot.
+        let vehicle = Vehicle::default();
+        let start_reach = [-14.0 / vehicle.length, -7.0 / vehicle.length];
+        let config = GeneratorConfig { start_reach, ..GeneratorConfig::default() };
+        let again = generate(&config, &vehicle, kind, level, 7, index);
         assert_eq!(again.source, recorded.source);
         assert_eq!(again.obstacles.len(), recorded.obstacles.len(), "{kind}");
         // Not to the last bit: sines differ between systems.

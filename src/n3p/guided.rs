@@ -33,8 +33,6 @@ use known::{ENOUGH, Known, Prepared, USUAL, most_changes};
 const LEG_EXPANSIONS: usize = 5_000;
 /// Who starts within so many vehicle lengths of the goal may stand within a manoeuvre.
 const NEAR_GOAL: f64 = 2.0;
-/// Who starts within so many does so as a rule.
-const AT_THE_SPOT: f64 = 1.0;
 /// A refined plan that still costs so many times the least is searched for once more, within so
 /// many expansions.
 const DOUBTFUL: f64 = 2.0;
@@ -251,9 +249,10 @@ impl GuidedPlanner {
             return (known.path, known.guidance);
         }
         let is_usual = self.is_usual(problem, goal, &known);
+        let at_the_spot = problem.starts_at_the_spot();
         let apart = problem.start.distance(problem.goal) / problem.vehicle.length;
         let is_cheap = known.cost <= USUAL * known.least;
-        let may_go_on = apart < AT_THE_SPOT || (!is_cheap && apart < NEAR_GOAL);
+        let may_go_on = at_the_spot || (!is_cheap && apart < NEAR_GOAL);
         if may_go_on && known.cost > ENOUGH * self.hars.lower_bound(problem, goal) {
             known = self.or_rest(problem, known);
         }
@@ -262,7 +261,8 @@ impl GuidedPlanner {
         }
         let Known { path, mut guidance, least, .. } = known;
         let before = *left;
-        let mut refined = self.hars.refine(problem, goal, path.clone(), Effort::Usual, None, left);
+        let spent = at_the_spot.then_some(0);
+        let mut refined = self.hars.refine(problem, goal, path.clone(), Effort::Usual, spent, left);
         let model = self.hars.cost(&problem.vehicle);
         let cost = |path: &Path| model.path(&problem.vehicle, &path.segments);
         let doubtful = refined.direction_changes() > most_changes(problem.kind)

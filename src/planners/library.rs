@@ -27,10 +27,12 @@ use super::joint;
 /// lock. Poses are looked at so far apart along it. Both for the default vehicle.
 const BESIDE: f64 = 0.4;
 const STRIDE: f64 = 0.25;
-/// Free manoeuvres tried for something cheaper than a plan, and by which share at least.
+/// Free manoeuvres tried for something cheaper than a plan, the second for who stands at the spot and so
+/// within many of them, and by which share at least.
 const BETTER: usize = 10;
+const BETTER_AT_THE_SPOT: usize = 80;
 const GAIN: f64 = 0.03;
-/// The cheapest rests of manoeuvres that are bent to begin at the start.
+/// The cheapest free rests of manoeuvres that are bent to begin at the start.
 const RESTS: usize = 12;
 
 /// Manoeuvres prepared for one footprint and one cost model.
@@ -111,9 +113,11 @@ impl Library {
         let near = near.map(|path| (cost(&path), path));
         let mut near: Vec<(f64, Path)> = near.filter(|(cost, _)| *cost < bound).collect();
         near.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let bent = near.into_iter().take(RESTS).filter_map(|(_, rest)| {
-            let begin = problem.goal.compose(rest.start);
-            let path = joint::close(problem, &Path { start: begin, ..rest })?;
+        let here =
+            |(_, rest): (f64, Path)| Path { start: problem.goal.compose(rest.start), ..rest };
+        let free = near.into_iter().map(here).filter(|rest| problem.collision.path_is_free(rest));
+        let bent = free.take(RESTS).filter_map(|rest| {
+            let path = joint::close(problem, &rest)?;
             let cost = cost(&path);
             (cost < bound).then_some((path, cost))
         });
@@ -359,7 +363,9 @@ impl LookUp<'_> {
 
     /// The next plan that costs clearly less than one of this `cost`, if one of the next few does.
     pub fn better(&mut self, cost: f64) -> Option<LibraryPlan> {
-        self.next(cost * (1.0 - GAIN), BETTER)
+        let at_the_spot = self.problem.starts_at_the_spot();
+        let tries = if at_the_spot { BETTER_AT_THE_SPOT } else { BETTER };
+        self.next(cost * (1.0 - GAIN), tries)
     }
 
     /// The first plan by one of the first `tries` manoeuvres that [`LookUp::next`] found free, whose

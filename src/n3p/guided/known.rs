@@ -1,6 +1,6 @@
 //! What `n3p` knows without a search: the manoeuvres of its library, and what they say about a plan.
 
-use super::{AT_THE_SPOT, GuidedPlanner};
+use super::GuidedPlanner;
 use crate::curves::{Path, Segment};
 use crate::planners::cost::CostModel;
 use crate::planners::hybrid_astar::{GoalSet, Leg};
@@ -105,7 +105,8 @@ impl GuidedPlanner {
         {
             best = Some(by_manoeuvre(better));
         }
-        if best.as_ref().is_none_or(|known| known.cost > USUAL * known.least) {
+        let is_dear = |known: &Known| known.cost > USUAL * known.least;
+        if problem.starts_at_the_spot() || best.as_ref().is_none_or(is_dear) {
             best = self.rarely_of_use(problem, &cost, best, least);
         }
         self.out_of_the_mouth(problem, &cost, best)
@@ -204,7 +205,7 @@ impl GuidedPlanner {
     /// may be within one that was not); where that is little, the curve through empty space does.
     pub(super) fn is_usual(&mut self, problem: &Problem, goal: &GoalSet, known: &Known) -> bool {
         known.cost <= USUAL * known.least
-            || (problem.start.distance(problem.goal) >= AT_THE_SPOT * problem.vehicle.length
+            || (!problem.starts_at_the_spot()
                 && known.path.direction_changes() <= most_changes(problem.kind)
                 && (known.cost <= DEAR_BY_UNUSUAL * known.least
                     || known.cost <= DEAR * known.least && !self.is_unusual(problem)))
