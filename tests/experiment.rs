@@ -29,6 +29,9 @@ back = 10.0
 bay_depth = 5.5
 parallel_depth = 2.4
 
+[train.knn]
+worlds = 20
+
 [train.mlp]
 epochs = 2
 validation_share = 0.25

@@ -22,6 +22,12 @@ const EXACT: f64 = 1e-10;
 /// The free path from the start of `problem` to the end of `path`, which begins nearby,
 /// with as many as possible of its last motions unchanged.
 pub(super) fn close(problem: &Problem, path: &Path) -> Option<Path> {
+    // Nothing is to be bent for who stands on the path.
+    let as_it_is = Path { start: problem.start, ..path.clone() };
+    let error = difference(as_it_is.end(), path.end());
+    if error.iter().all(|e| e.abs() < Problem::ROUNDING / 2.0) {
+        return problem.collision.path_is_free(&as_it_is).then_some(as_it_is);
+    }
     let mut target = path.start;
     path.segments.iter().enumerate().find_map(|(i, s)| {
         target = s.end(target);

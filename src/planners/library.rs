@@ -32,6 +32,8 @@ const STRIDE: f64 = 0.25;
 const BETTER: usize = 10;
 const BETTER_AT_THE_SPOT: usize = 80;
 const GAIN: f64 = 0.03;
+/// Newton's steps to the pose beside the start.
+const STEPS_BESIDE: usize = 4;
 /// The cheapest free rests of manoeuvres that are bent to begin at the start.
 const RESTS: usize = 12;
 
@@ -151,7 +153,14 @@ impl Library {
             }
             pose = s.end(pose);
         }
-        let (i, driven, at) = best?;
+        let (i, mut driven, mut at) = best?;
+        // Right beside the start rather than a stride away: nothing is to be bent for who stands on it.
+        for _ in 0..STEPS_BESIDE {
+            let ahead = at.point_to_local(start.position()).x * motions[i].gear().sign();
+            driven = (driven.abs() + ahead).clamp(0.0, motions[i].length.abs())
+                * motions[i].gear().sign();
+            at = motions[i].at(begin_of(motions, manoeuvre.entry.pose, i), driven);
+        }
         let first = Segment { length: motions[i].length - driven, ..motions[i] };
         Some(Path::new(at, std::iter::once(first).chain(motions[i + 1..].iter().copied())))
     }
@@ -165,6 +174,11 @@ impl Library {
     pub fn is_empty(&self) -> bool {
         self.manoeuvres.is_empty()
     }
+}
+
+/// Where motion `i` begins, seen from the goal.
+fn begin_of(motions: &[Segment], begin: Pose, i: usize) -> Pose {
+    motions[..i].iter().fold(begin, |pose, s| s.end(pose))
 }
 
 impl Manoeuvre {
