@@ -254,6 +254,12 @@ impl GuidedPlanner {
         let is_cheap = known.cost <= USUAL * known.least;
         let may_go_on = at_the_spot || (!is_cheap && apart < NEAR_GOAL);
         if may_go_on && known.cost > ENOUGH * self.hars.lower_bound(problem, goal) {
+            // Estimates are coarse so near the goal: the curve straight there may cost less, too.
+            let direct = self.hars.direct_below(problem, problem.start, goal, known.cost);
+            if let Some(Leg { path, cost, .. }) = direct {
+                let guidance = Guidance { preparatory: None, route: Route::Direct };
+                known = Known { path, cost, guidance, ..known };
+            }
             known = self.or_rest(problem, known);
         }
         if is_usual && !self.hars.passes_near(problem, &known.path) {
