@@ -248,7 +248,6 @@ impl GuidedPlanner {
         if effort == Effort::First {
             return (known.path, known.guidance);
         }
-        let is_usual = self.is_usual(problem, goal, &known);
         let at_the_spot = problem.starts_at_the_spot();
         let apart = problem.start.distance(problem.goal) / problem.vehicle.length;
         let is_cheap = known.cost <= USUAL * known.least;
@@ -262,13 +261,13 @@ impl GuidedPlanner {
             }
             known = self.or_rest(problem, known);
         }
+        let is_usual = self.is_usual(problem, goal, &known);
         if is_usual && !self.hars.passes_near(problem, &known.path) {
             return (known.path, known.guidance);
         }
         let Known { path, mut guidance, least, .. } = known;
         let before = *left;
-        let spent = at_the_spot.then_some(0);
-        let mut refined = self.hars.refine(problem, goal, path.clone(), Effort::Usual, spent, left);
+        let mut refined = self.hars.refine(problem, goal, path.clone(), Effort::Usual, None, left);
         let model = self.hars.cost(&problem.vehicle);
         let cost = |path: &Path| model.path(&problem.vehicle, &path.segments);
         let doubtful = refined.direction_changes() > most_changes(problem.kind)

@@ -27,10 +27,8 @@ use super::joint;
 /// lock. Poses are looked at so far apart along it. Both for the default vehicle.
 const BESIDE: f64 = 0.4;
 const STRIDE: f64 = 0.25;
-/// Free manoeuvres tried for something cheaper than a plan, the second for who stands at the spot and so
-/// within many of them, and by which share at least.
+/// Free manoeuvres tried for something cheaper than a plan, and by which share at least.
 const BETTER: usize = 10;
-const BETTER_AT_THE_SPOT: usize = 80;
 const GAIN: f64 = 0.03;
 /// Newton's steps to the pose beside the start.
 const STEPS_BESIDE: usize = 4;
@@ -377,9 +375,7 @@ impl LookUp<'_> {
 
     /// The next plan that costs clearly less than one of this `cost`, if one of the next few does.
     pub fn better(&mut self, cost: f64) -> Option<LibraryPlan> {
-        let at_the_spot = self.problem.starts_at_the_spot();
-        let tries = if at_the_spot { BETTER_AT_THE_SPOT } else { BETTER };
-        self.next(cost * (1.0 - GAIN), tries)
+        self.next(cost * (1.0 - GAIN), BETTER)
     }
 
     /// The first plan by one of the first `tries` manoeuvres that [`LookUp::next`] found free, whose

@@ -105,8 +105,7 @@ impl GuidedPlanner {
         {
             best = Some(by_manoeuvre(better));
         }
-        let is_dear = |known: &Known| known.cost > USUAL * known.least;
-        if problem.starts_at_the_spot() || best.as_ref().is_none_or(is_dear) {
+        if best.as_ref().is_none_or(|known| known.cost > USUAL * known.least) {
             best = self.rarely_of_use(problem, &cost, best, least);
         }
         self.out_of_the_mouth(problem, &cost, best)
@@ -201,12 +200,11 @@ impl GuidedPlanner {
     }
 
     /// Whether a plan costs no more than usual: what is known of the spot says what it takes, by a usual
-    /// one within wide limits, as manoeuvres for it were learnt in many worlds (but who stands at the spot
-    /// may be within one that was not); where that is little, the curve through empty space does.
+    /// one within wide limits, as manoeuvres for it were learnt in many worlds; where that is little, the
+    /// curve through empty space does.
     pub(super) fn is_usual(&mut self, problem: &Problem, goal: &GoalSet, known: &Known) -> bool {
         known.cost <= USUAL * known.least
-            || (!problem.starts_at_the_spot()
-                && known.path.direction_changes() <= most_changes(problem.kind)
+            || (known.path.direction_changes() <= most_changes(problem.kind)
                 && (known.cost <= DEAR_BY_UNUSUAL * known.least
                     || known.cost <= DEAR * known.least && !self.is_unusual(problem)))
             || known.cost <= ENOUGH * self.hars.lower_bound(problem, goal)
