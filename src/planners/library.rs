@@ -32,7 +32,9 @@ const BETTER: usize = 10;
 const GAIN: f64 = 0.03;
 /// Newton's steps to the pose beside the start.
 const STEPS_BESIDE: usize = 4;
-/// The cheapest free rests of manoeuvres that are bent to begin at the start.
+/// The cheapest rests of manoeuvres that are looked at, and the free ones among them that are bent to begin
+/// at the start.
+const NEAR_RESTS: usize = 100;
 const RESTS: usize = 12;
 
 /// Manoeuvres prepared for one footprint and one cost model.
@@ -50,6 +52,8 @@ pub struct Library {
 struct Manoeuvre {
     /// Where it begins, and the motions from there.
     entry: Entry,
+    /// Where its motions begin, in driving order, and the goal.
+    begins: Vec<Pose>,
     /// What its motions sweep when driven back from the goal, the longest first: it touches
     /// something most often. A verdict presumes that the motion begins free of contact; where it
     /// does not, that of another motion is the right one.
@@ -86,16 +90,18 @@ impl Library {
             s.curvature = s.curvature.clamp(-limit, limit);
         }
         let mut pose = Pose::default();
-        let mut motions = Vec::new();
+        let (mut motions, mut begins) = (Vec::new(), vec![pose]);
         for back in segments.iter().rev().map(|s| s.reversed()) {
             motions.push((BodyFrame::new(pose), Sweep::new(&self.footprint, back)));
             pose = back.end(pose);
+            begins.push(pose);
         }
+        begins.reverse();
         let length = |(_, sweep): &(BodyFrame, Sweep)| sweep.segment().length.abs();
         motions.sort_by(|a, b| length(b).total_cmp(&length(a)));
         let entry = Entry::new(pose, segments, true, &self.vehicle, model);
         self.begins.push(entry.pose, entry.cost());
-        self.manoeuvres.push(Manoeuvre { entry, motions });
+        self.manoeuvres.push(Manoeuvre { entry, begins, motions });
     }
 
     /// Whether it was prepared for the vehicle and the footprint of `problem`.
@@ -115,13 +121,15 @@ impl Library {
         near.sort_by(|a, b| a.0.total_cmp(&b.0));
         let here =
             |(_, rest): (f64, Path)| Path { start: problem.goal.compose(rest.start), ..rest };
-        let free = near.into_iter().map(here).filter(|rest| problem.collision.path_is_free(rest));
-        let bent = free.take(RESTS).filter_map(|rest| {
+        let nearest = near.into_iter().take(NEAR_RESTS).map(here);
+        let free = nearest.filter(|rest| problem.collision.path_is_free(rest));
+        let mut bent = free.take(RESTS).filter_map(|rest| {
             let path = joint::close(problem, &rest)?;
             let cost = cost(&path);
             (cost < bound).then_some((path, cost))
         });
-        bent.min_by(|a, b| a.1.total_cmp(&b.1))
+        // In order of cost, which bending hardly changes.
+        bent.next()
     }
 
     /// The rest of a manoeuvre from where it passes nearest to `start`, if that is near; poses are
@@ -131,13 +139,16 @@ impl Library {
         let radius = self.vehicle.turning_radius();
         let motions = &manoeuvre.entry.rest;
         let (mut best, mut nearest) = (None, BESIDE * scale);
-        let mut pose = manoeuvre.entry.pose;
-        for (i, s) in motions.iter().enumerate() {
+        for (i, (s, ends)) in motions.iter().zip(manoeuvre.begins.windows(2)).enumerate() {
             // Nothing of this motion comes as near as the best: neither its places nor its headings.
-            let length = s.length.abs();
+            let (pose, length) = (ends[0], s.length.abs());
+            let apart = pose.distance(start).min(ends[1].distance(start));
+            if apart > length / 2.0 + nearest {
+                continue;
+            }
             let turn = signed_angle(pose.heading, start.heading).abs();
             let turns_there = (turn - length * s.curvature.abs()) * radius <= nearest;
-            if turns_there && pose.distance(start) <= length + nearest {
+            if turns_there {
                 let steps = (length / (STRIDE * scale)).ceil().max(1.0);
                 for k in 0..steps as usize {
                     let driven = s.length * k as f64 / steps;
@@ -149,7 +160,6 @@ impl Library {
                     }
                 }
             }
-            pose = s.end(pose);
         }
         let (i, mut driven, mut at) = best?;
         // Right beside the start rather than a stride away: nothing is to be bent for who stands on it.
@@ -157,7 +167,7 @@ impl Library {
             let ahead = at.point_to_local(start.position()).x * motions[i].gear().sign();
             driven = (driven.abs() + ahead).clamp(0.0, motions[i].length.abs())
                 * motions[i].gear().sign();
-            at = motions[i].at(begin_of(motions, manoeuvre.entry.pose, i), driven);
+            at = motions[i].at(manoeuvre.begins[i], driven);
         }
         let first = Segment { length: motions[i].length - driven, ..motions[i] };
         Some(Path::new(at, std::iter::once(first).chain(motions[i + 1..].iter().copied())))
@@ -172,11 +182,6 @@ impl Library {
     pub fn is_empty(&self) -> bool {
         self.manoeuvres.is_empty()
     }
-}
-
-/// Where motion `i` begins, seen from the goal.
-fn begin_of(motions: &[Segment], begin: Pose, i: usize) -> Pose {
-    motions[..i].iter().fold(begin, |pose, s| s.end(pose))
 }
 
 impl Manoeuvre {
