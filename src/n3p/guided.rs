@@ -26,7 +26,7 @@ use crate::selectors::{Features, PoseSelector};
 
 mod known;
 
-use known::{ENOUGH, Known, Prepared, USUAL, most_changes};
+use known::{ENOUGH, Known, Prepared, most_changes};
 
 /// Expansions that the paper's two legs may spend, so that a pose just beside the feasible
 /// ones does not use up what the full search needs.
@@ -250,8 +250,7 @@ impl GuidedPlanner {
         }
         let at_the_spot = problem.starts_at_the_spot();
         let apart = problem.start.distance(problem.goal) / problem.vehicle.length;
-        let is_cheap = known.cost <= USUAL * known.least;
-        let may_go_on = at_the_spot || (!is_cheap && apart < NEAR_GOAL);
+        let may_go_on = at_the_spot || (apart < NEAR_GOAL && !self.is_usual(problem, goal, &known));
         if may_go_on && known.cost > ENOUGH * self.hars.lower_bound(problem, goal) {
             // Estimates are coarse so near the goal: the curve straight there may cost less, too.
             let direct = self.hars.direct_below(problem, problem.start, goal, known.cost);

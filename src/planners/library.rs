@@ -34,8 +34,8 @@ const GAIN: f64 = 0.03;
 const STEPS_BESIDE: usize = 4;
 /// The cheapest rests of manoeuvres that are looked at, and the free ones among them that are bent to begin
 /// at the start.
-const NEAR_RESTS: usize = 100;
-const RESTS: usize = 12;
+const NEAR_RESTS: usize = 50;
+const RESTS: usize = 3;
 
 /// Manoeuvres prepared for one footprint and one cost model.
 #[derive(Clone, Debug)]

@@ -196,9 +196,10 @@ impl Problem {
     /// than what a car is made of can be mistaken for.
     pub const MAX_CONTACT: f64 = 0.2;
 
-    /// Whether the start lies within a vehicle's length of the goal: as a rule within some manoeuvre.
+    /// Whether the start lies about a vehicle's length from the goal or nearer: as a rule within some
+    /// manoeuvre.
     pub(crate) fn starts_at_the_spot(&self) -> bool {
-        self.start.distance(self.goal) < self.vehicle.length
+        self.start.distance(self.goal) < 1.1 * self.vehicle.length
     }
 
     /// [`Problem::MARGIN`] for a vehicle of this size, metres.

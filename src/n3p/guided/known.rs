@@ -21,7 +21,7 @@ const FIRST_TRIES: usize = 16;
 /// A plan that costs at most so many times the estimate of the best known one (which knows nothing
 /// of joints and obstacles) or the least cost through empty space is taken as it is, unless it
 /// passes something near on its way.
-pub(super) const USUAL: f64 = 1.3;
+const USUAL: f64 = 1.3;
 pub(super) const ENOUGH: f64 = 1.1;
 /// What costs more than this many times the estimate is looked at again, the second by a spot that no
 /// usual cell stands for.
