@@ -27,7 +27,6 @@ use n3p::n3p::{Method, MethodSettings, Models};
 use n3p::output::PathFile;
 use n3p::planners::{Budget, Planner, Problem};
 use n3p::rng::{Stream, rng};
-use n3p::world::generate::GeneratorConfig;
 use n3p::world::{Level, ParkingType, Scene};
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -48,14 +47,7 @@ fn main() -> anyhow::Result<()> {
 
     let models = Models::load(&["models/knn.bin"])?;
     let vehicle = models.vehicle().unwrap_or_default();
-    let cases = suite::generated(
-        &GeneratorConfig::default(),
-        &vehicle,
-        &ParkingType::ALL,
-        &Level::ALL,
-        count,
-        seed,
-    )?;
+    let cases = suite::at_home(&vehicle, &ParkingType::ALL, &Level::ALL, count, seed)?;
     let mut planners = Vec::new();
     for method in METHODS {
         planners.push(method.build(&models, &MethodSettings::default())?);

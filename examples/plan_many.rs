@@ -10,7 +10,6 @@ use n3p::lab::evaluation::suite;
 use n3p::n3p::{Method, MethodSettings, Models};
 use n3p::planners::{Budget, Problem};
 use n3p::vehicle::Vehicle;
-use n3p::world::generate::GeneratorConfig;
 use n3p::world::{Level, ParkingType};
 
 const SEED: u64 = 1;
@@ -29,14 +28,7 @@ fn main() -> anyhow::Result<()> {
     let mut planner = method.build(&models, &MethodSettings::default())?;
     for &kind in &kinds {
         for &level in &levels {
-            let cases = suite::generated(
-                &GeneratorConfig::default(),
-                &Vehicle::default(),
-                &[kind],
-                &[level],
-                count,
-                SEED,
-            )?;
+            let cases = suite::at_home(&Vehicle::default(), &[kind], &[level], count, SEED)?;
             let (mut times, mut failures, mut expansions) = (Vec::new(), 0, 0);
             for case in &cases {
                 for _ in 0..repeats {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use n3p::curves::Segment;
 use n3p::geometry::{Pose, signed_angle};
 use n3p::lab::dataset::{Dataset, Metadata, Sample, Status};
-use n3p::lab::training::knn::KnnConfig;
+use n3p::lab::training::worlds::WorldsConfig;
 use n3p::lab::training::{self, Loss, MlpConfig, Targets, TrainingError, Validation};
 use n3p::planners::HybridAStarConfig;
 use n3p::rng::{Stream, rng};
@@ -110,7 +110,7 @@ fn knn_of(samples: &[Sample], kinds: &[ParkingType], dir: &Path) -> KnnSelector 
 }
 
 /// Of the samples alone.
-const NO_WORLDS: KnnConfig = KnnConfig { worlds: 0, seed: 1 };
+const NO_WORLDS: WorldsConfig = WorldsConfig { count: 0, seed: 1 };
 
 fn features(start: Pose, cell: usize) -> Features {
     Features::new(start, metadata().grid.cell(KIND, cell))
@@ -250,8 +250,8 @@ fn manoeuvres_are_learnt_in_worlds() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("knn.bin");
     let few = samples(KIND, &[0], 5, 1);
-    let learnt = |worlds| {
-        let config = KnnConfig { worlds, seed: 3 };
+    let learnt = |count| {
+        let config = WorldsConfig { count, seed: 3 };
         training::knn::train(&metadata(), &few, &[KIND], &config, &path).unwrap();
         (KnnSelector::load(&path).unwrap().manoeuvres(KIND, &metadata().vehicle), config)
     };
@@ -263,7 +263,7 @@ fn manoeuvres_are_learnt_in_worlds() {
     assert!(text.contains("60 generated worlds of each type (seed 3)"), "{text}");
     let log: training::knn::KnnLog =
         serde_json::from_slice(&std::fs::read(training::log_path(&path)).unwrap()).unwrap();
-    assert_eq!(log.config, config);
+    assert_eq!(log.worlds, config);
     // So do those that drive smaller cars.
     let small = Metadata {
         vehicle: Vehicle {
@@ -282,7 +282,7 @@ fn manoeuvres_are_learnt_in_worlds() {
         &metadata(),
         &few,
         &[KIND],
-        &KnnConfig { worlds: 2_000_000, seed: 3 },
+        &WorldsConfig { count: 2_000_000, seed: 3 },
         &path,
     );
     assert!(error.unwrap_err().to_string().contains("worlds is 2000000; expected 0 to 1000000"));

@@ -132,15 +132,7 @@ fn results_do_not_depend_on_margins_planned_before() {
 #[test]
 fn no_margin_is_the_usual_one() {
     let (models, kinds) = (models(), ParkingType::ALL);
-    let cases = suite::generated(
-        &GeneratorConfig::default(),
-        &Vehicle::default(),
-        &kinds,
-        &Level::ALL,
-        3,
-        11,
-    )
-    .unwrap();
+    let cases = suite::at_home(&Vehicle::default(), &kinds, &Level::ALL, 3, 11).unwrap();
     let rows = |margin_m| {
         let config = SuiteConfig {
             methods: vec![Method::HA_RS, Method::N3P],

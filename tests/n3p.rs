@@ -9,7 +9,7 @@ use n3p::lab::evaluation::{oracle, suite};
 use n3p::n3p::guided::RankedConfig;
 use n3p::n3p::{Method, MethodSettings, Models};
 use n3p::output::PathFile;
-use n3p::planners::{Budget, HybridAStarConfig, Problem, Route};
+use n3p::planners::{Budget, HybridAStarConfig, Planner, Problem, Route};
 use n3p::selectors::Features;
 use n3p::selectors::model::Model;
 use n3p::vehicle::{Gear, Vehicle};
@@ -83,8 +83,7 @@ fn every_pose_the_knn_selects_has_a_free_curve_in_the_scenes_own_cell() {
 #[test]
 fn no_method_fails_on_900_scenes() {
     let models = Models::load(&["models/knn.bin"]).unwrap();
-    let scenes = suite::generated(
-        &GeneratorConfig::default(),
+    let scenes = suite::at_home(
         &models.vehicle().expect("the model knows its vehicle"),
         &ParkingType::ALL,
         &Level::ALL,
@@ -114,9 +113,7 @@ fn settings_decide_what_is_tried_before_a_search() {
     let models = Models::load(&["models/knn.bin"]).unwrap();
     let vehicle = models.vehicle().unwrap();
     let kind = [ParkingType::Parallel];
-    let scenes =
-        suite::generated(&GeneratorConfig::default(), &vehicle, &kind, &[Level::Extreme], 40, 4242)
-            .unwrap();
+    let scenes = suite::at_home(&vehicle, &kind, &[Level::Extreme], 40, 4242).unwrap();
     let plans = |n3p: RankedConfig| {
         let settings = MethodSettings { n3p, ..MethodSettings::default() };
         let mut planner = Method::N3P.build(&models, &settings).unwrap();
@@ -174,4 +171,40 @@ fn where_known_manoeuvres_cannot_be_joined_the_curve_to_the_goal_serves() {
 #[ignore = "needs ../shared/scenes"]
 fn where_known_manoeuvres_cannot_be_joined_in_real_lots_the_curve_to_the_goal_serves() {
     check_curves_to_the_goal("../shared/scenes/dlp");
+}
+
+/// What a planner was asked before does not matter, least of all what it made ready for a bay where
+/// nothing is a bay.
+#[test]
+fn plans_do_not_depend_on_those_before() {
+    let models = Models::load(&["models/knn.bin"]).unwrap();
+    let build = || Method::N3P.build(&models, &MethodSettings::default()).unwrap();
+    let vehicle = Vehicle::default();
+    let mut used = build();
+    let mut spotless = 0;
+    for i in 0..40 {
+        let kind = ParkingType::ALL[i as usize % 3];
+        let bay = generate(&GeneratorConfig::default(), &vehicle, kind, Level::Easy, 6, i);
+        used.plan(&Problem::new(&bay).unwrap(), Budget::new(20_000));
+        // The same car in front of something else, and near its goal, where rests are looked for.
+        let start = bay.goal.compose(Pose::new(1.5, 0.1, 0.05));
+        let (parking_type, obstacles) = (None, Vec::new());
+        let open = Scene { start, parking_type, obstacles, ..bay };
+        let walls = Scene {
+            obstacles: [-1.6, 1.6]
+                .map(|y| {
+                    let corner = |x, y| open.goal.point_to_parent([x, y].into()).into();
+                    vec![corner(-15.0, y), corner(20.0, y), corner(20.0, y * 1.1)]
+                })
+                .to_vec(),
+            ..open.clone()
+        };
+        for scene in [open, walls] {
+            let Ok(problem) = Problem::new(&scene) else { continue };
+            spotless += usize::from(problem.kind.is_none());
+            let plan = |planner: &mut dyn Planner| planner.plan(&problem, Budget::new(20_000));
+            assert_eq!(plan(used.as_mut()).outcome, plan(build().as_mut()).outcome, "{i}");
+        }
+    }
+    assert!(spotless > 20, "{spotless} without a spot");
 }

@@ -9,7 +9,7 @@ use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput, PolicyArgs};
 use n3p::episode::Case;
 use n3p::lab::evaluation::report::{self, Provenance};
-use n3p::lab::evaluation::suite::{self, SuiteConfig, SuiteError, World};
+use n3p::lab::evaluation::suite::{self, Drawn, SuiteConfig, SuiteError, World};
 use n3p::lab::evaluation::{Outputs, metrics, quality};
 use n3p::lab::progress;
 use n3p::lab::training;
@@ -200,13 +200,13 @@ fn choose(args: &Args, vehicle: &Vehicle, methods: &[Method], models: &Models) -
         let text = "--level: only the world home has levels; leave it out";
         return Err(BadInput(text.to_owned()).into());
     }
-    let (count, mut cases) = (args.count as usize, Vec::new());
-    let generator = GeneratorConfig::default();
+    let (generator, count) = (GeneratorConfig::default(), args.count as usize);
+    let (kinds, levels, seed) = (&kinds, &levels, args.seed);
+    let drawn = Drawn { generator: &generator, vehicle, kinds, levels, count, seed };
+    let mut cases = Vec::new();
     for &world in worlds {
-        let of_world =
-            suite::of_world(world, &generator, vehicle, &kinds, &levels, count, args.seed);
-        cases.extend(of_world.or_bad_input()?);
+        cases.extend(drawn.cases(world).or_bad_input()?);
     }
-    let title = suite::title(cases.len(), worlds, count, args.seed);
+    let title = drawn.title(cases.len(), worlds);
     Ok(Chosen { cases, title, complaint: None })
 }

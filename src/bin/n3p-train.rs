@@ -9,9 +9,9 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::environment::courses::{Course, Stratum};
 use n3p::lab::dataset::Dataset;
-use n3p::lab::training::knn::KnnConfig;
 use n3p::lab::training::quality::{Errors, Reach};
 use n3p::lab::training::rl::{Begin, RlConfig};
+use n3p::lab::training::worlds::WorldsConfig;
 use n3p::lab::training::{self, MlpConfig, TrainingError};
 use n3p::selectors::artefact;
 use n3p::world::ParkingType;
@@ -81,7 +81,7 @@ struct KnnArgs {
     #[arg(long, value_name = "FILE", default_value = "models/knn.bin")]
     out: PathBuf,
     /// Generated worlds of each type in which manoeuvres are learnt, too; 0 for none
-    #[arg(long, value_name = "N", default_value_t = KnnConfig::default().worlds)]
+    #[arg(long, value_name = "N", default_value_t = WorldsConfig::default().count)]
     worlds: u32,
     /// Seed of the worlds; that of the data set when omitted
     #[arg(long, value_name = "S")]
@@ -103,7 +103,7 @@ struct FleetArgs {
     #[arg(long, value_name = "S")]
     seed: Option<u64>,
     /// Generated worlds of each type in which manoeuvres are learnt, too; 0 for none
-    #[arg(long, value_name = "N", default_value_t = KnnConfig::default().worlds)]
+    #[arg(long, value_name = "N", default_value_t = WorldsConfig::default().count)]
     worlds: u32,
 }
 
@@ -206,11 +206,11 @@ fn mlp_config(file: Option<&Path>, seed: Option<u64>) -> anyhow::Result<MlpConfi
 }
 
 fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
-    KnnConfig { worlds: args.worlds, ..KnnConfig::default() }.validate().or_bad_input()?;
+    WorldsConfig { count: args.worlds, ..WorldsConfig::default() }.validate().or_bad_input()?;
     artefact::check_writable(&args.out).or_bad_input()?;
     let (data, kinds) = read(&args.common)?;
     let seed = args.seed.unwrap_or(data.metadata.seed);
-    let config = KnnConfig { worlds: args.worlds, seed };
+    let config = WorldsConfig { count: args.worlds, seed };
     let begin = Instant::now();
     let log = training::knn::train(&data.metadata, &data.samples, &kinds, &config, &args.out)
         .map_err(|e| exit_code(e, &args.common.data))?;
@@ -226,7 +226,7 @@ fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
 
 fn fleet(args: &FleetArgs) -> anyhow::Result<ExitCode> {
     let config = mlp_config(args.config.as_deref(), args.seed)?;
-    let worlds = KnnConfig { worlds: args.worlds, seed: config.seed };
+    let worlds = WorldsConfig { count: args.worlds, seed: config.seed };
     worlds.validate().or_bad_input()?;
     artefact::check_writable(&args.out).or_bad_input()?;
     let sets = args.data.iter().map(|folder| Dataset::read(folder, None).or_bad_input());

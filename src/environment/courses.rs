@@ -94,7 +94,7 @@ fn cell_problem(vehicle: &Vehicle, stratum: Stratum, rng: &mut ChaCha8Rng) -> Pr
         let Ok(mut problem) = Problem::in_cell(&grid, &cell, *vehicle, goal) else { continue };
         let [lane, _] = grid.regions(&cell);
         let start = (0..DRAWS).find_map(|_| {
-            let x = between(start_x);
+            let x = between([start_x[0], start_x[1].min(lane.max.x)]);
             let y = between([lane.min.y, lane.max.y]);
             let heading = generator.start_heading;
             let start = Pose::new(x, y, between([-heading, heading]));
@@ -110,6 +110,23 @@ fn cell_problem(vehicle: &Vehicle, stratum: Stratum, rng: &mut ChaCha8Rng) -> Pr
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::{Aabb, segment_in_box};
+
+    /// Nothing stands between a start and the spot's own part of the lane, least of all its dead end.
+    #[test]
+    fn starts_in_cells_lie_on_this_side_of_the_dead_end() {
+        let mut beyond = 0;
+        for i in 0..300 {
+            let stratum = Stratum::nth(i as usize % Stratum::COUNT);
+            let problem = Course::Simple.problem(&Vehicle::default(), stratum, 8, i);
+            let Pose { x, y, .. } = problem.start;
+            let way = Aabb::new(x.min(0.0), y, x.max(0.0), y);
+            let is_blocked = problem.obstacles.edges().any(|(a, b)| segment_in_box(a, b, &way));
+            assert!(!is_blocked, "{stratum:?} {i}: {x} {y}");
+            beyond += usize::from(x > 0.0);
+        }
+        assert!(beyond > 30, "{beyond} starts beyond the spot");
+    }
 
     #[test]
     fn problems_depend_on_their_arguments_alone_and_have_free_ends() {

@@ -26,18 +26,18 @@ use crate::selectors::{Features, PoseSelector};
 
 mod known;
 
-use known::{ENOUGH, Known, Prepared, most_changes};
+use known::{DEAR_BY_UNUSUAL, Known, Prepared, Standard, most_changes};
 
 /// Expansions that the paper's two legs may spend, so that a pose just beside the feasible
 /// ones does not use up what the full search needs.
 const LEG_EXPANSIONS: usize = 5_000;
 /// Who starts within so many vehicle lengths of the goal may stand within a manoeuvre.
 const NEAR_GOAL: f64 = 2.0;
-/// A refined plan that still costs so many times the least is searched for once more, within so
-/// many expansions.
+/// A refined plan of more changes than usual that costs so many times the least is searched for once
+/// more, within so many expansions.
 const DOUBTFUL: f64 = 2.0;
 const SECOND_SEARCH: usize = 1500;
-/// The same by a spot that no cell of the model stands for: its manoeuvres may not be made for it.
+/// The same by a spot that no usual cell stands for: the manoeuvres may not be made for it.
 const UNUSUAL_SEARCH: usize = 3_000;
 
 /// What `n3p` tries before it searches. The paper's rows have no such settings.
@@ -160,10 +160,9 @@ impl GuidedPlanner {
     }
 
     /// The plan, or the curve straight to the goal where that costs less: a car that is nearly
-    /// parked is not sent back to a preparatory pose.
+    /// parked is not sent back to a preparatory pose, and estimates are coarse so near the goal.
     fn or_direct(&mut self, problem: &Problem, planned: (Path, Guidance)) -> (Path, Guidance) {
-        let vehicle = &problem.vehicle;
-        let cost = self.hars.cost(vehicle).path(vehicle, &planned.0.segments);
+        let cost = self.path_cost(problem, &planned.0);
         let goal = self.hars.goal_set(problem);
         match self.hars.direct_below(problem, problem.start, &goal, cost) {
             Some(leg) => (leg.path, Guidance { preparatory: None, route: Route::Direct }),
@@ -248,46 +247,66 @@ impl GuidedPlanner {
         if effort == Effort::First {
             return (known.path, known.guidance);
         }
-        let at_the_spot = problem.starts_at_the_spot();
+        let mut standard = Standard::new(problem, goal);
+        let mut is_usual = self.is_usual(&known, &mut standard);
         let apart = problem.start.distance(problem.goal) / problem.vehicle.length;
-        let may_go_on = at_the_spot || (apart < NEAR_GOAL && !self.is_usual(problem, goal, &known));
-        if may_go_on && known.cost > ENOUGH * self.hars.lower_bound(problem, goal) {
-            // Estimates are coarse so near the goal: the curve straight there may cost less, too.
-            let direct = self.hars.direct_below(problem, problem.start, goal, known.cost);
-            if let Some(Leg { path, cost, .. }) = direct {
-                let guidance = Guidance { preparatory: None, route: Route::Direct };
-                known = Known { path, cost, guidance, ..known };
-            }
-            known = self.or_rest(problem, known);
+        let may_go_on = problem.starts_at_the_spot() || (apart < NEAR_GOAL && !is_usual);
+        if may_go_on && known.cost > standard.enough(&mut self.hars) {
+            let (path, guidance) = self.or_direct(problem, (known.path, known.guidance));
+            let cost = self.path_cost(problem, &path);
+            known = self.or_rest(problem, Known { path, cost, guidance, ..known });
+            is_usual = self.is_usual(&known, &mut standard);
         }
-        let is_usual = self.is_usual(problem, goal, &known);
         if is_usual && !self.hars.passes_near(problem, &known.path) {
             return (known.path, known.guidance);
         }
         let Known { path, mut guidance, least, .. } = known;
         let before = *left;
         let mut refined = self.hars.refine(problem, goal, path.clone(), Effort::Usual, None, left);
-        let model = self.hars.cost(&problem.vehicle);
-        let cost = |path: &Path| model.path(&problem.vehicle, &path.segments);
-        let doubtful = refined.direction_changes() > most_changes(problem.kind)
-            && cost(&refined) > DOUBTFUL * least;
-        let is_dear = self.is_unusually_dear(problem, goal, cost(&refined), least);
-        if doubtful || is_dear {
-            let share = if is_dear { UNUSUAL_SEARCH } else { SECOND_SEARCH }.min(*left);
-            let mut spend = share;
-            let found = self.hars.search(problem, problem.start, goal, None, &mut spend);
-            *left -= share - spend;
-            if let Ok(leg) = found {
-                let found = self.refine(problem, goal, leg.path, Effort::Usual, 0, left);
-                if cost(&found) < cost(&refined) {
-                    refined = found;
-                }
-            }
+        let cost = self.path_cost(problem, &refined);
+        let is_dear = cost > DEAR_BY_UNUSUAL * least
+            && cost > standard.enough(&mut self.hars)
+            && standard.is_unusual();
+        let doubtful =
+            refined.direction_changes() > most_changes(problem.kind) && cost > DOUBTFUL * least;
+        if is_dear {
+            refined = self.or_searched(problem, goal, refined, UNUSUAL_SEARCH, false, left);
+        } else if doubtful {
+            refined = self.or_searched(problem, goal, refined, SECOND_SEARCH, false, left);
         }
         if refined != path {
             guidance = Self::anew(before - *left);
         }
         (refined, guidance)
+    }
+
+    fn path_cost(&self, problem: &Problem, path: &Path) -> f64 {
+        self.hars.cost(&problem.vehicle).path(&problem.vehicle, &path.segments)
+    }
+
+    /// `path`, or what a search of at most so many expansions finds where that costs less; on the usual
+    /// lattice or half a cell `aside` of it.
+    fn or_searched(
+        &mut self,
+        problem: &Problem,
+        goal: &GoalSet,
+        path: Path,
+        most: usize,
+        aside: bool,
+        left: &mut usize,
+    ) -> Path {
+        let share = most.min(*left);
+        let mut spend = share;
+        let found = if aside {
+            self.hars.search_aside(problem, problem.start, goal, &mut spend)
+        } else {
+            self.hars.search(problem, problem.start, goal, None, &mut spend)
+        };
+        *left -= share - spend;
+        let Ok(leg) = found else { return path };
+        // On the lattice of this search, and not for long: it is the second one.
+        let found = self.hars.refine(problem, goal, leg.path, Effort::Usual, Some(0), left);
+        if self.path_cost(problem, &found) < self.path_cost(problem, &path) { found } else { path }
     }
 
     /// A plan, or the best that half of what is left of the budget finds in its place.
@@ -321,19 +340,11 @@ impl GuidedPlanner {
         left: &mut usize,
     ) -> Path {
         let refined = self.hars.refine(problem, goal, path, effort, Some(spent), left);
-        if effort == Effort::First || refined.direction_changes() <= 2 || !self.is_unusual(problem)
-        {
+        let is_fine = refined.direction_changes() <= most_changes(problem.kind);
+        if effort == Effort::First || is_fine || !Standard::new(problem, goal).is_unusual() {
             return refined;
         }
-        let share = UNUSUAL_SEARCH.min(*left);
-        let mut spend = share;
-        let found = self.hars.search_aside(problem, problem.start, goal, &mut spend);
-        *left -= share - spend;
-        let Ok(leg) = found else { return refined };
-        let found = self.hars.refine(problem, goal, leg.path, effort, Some(0), left);
-        let model = self.hars.cost(&problem.vehicle);
-        let cost = |path: &Path| model.path(&problem.vehicle, &path.segments);
-        if cost(&found) < cost(&refined) { found } else { refined }
+        self.or_searched(problem, goal, refined, UNUSUAL_SEARCH, true, left)
     }
 
     /// `pose`, or one beside it, from which a curve leads to the goal, and that curve.

@@ -142,22 +142,19 @@ impl Library {
         for (i, (s, ends)) in motions.iter().zip(manoeuvre.begins.windows(2)).enumerate() {
             // Nothing of this motion comes as near as the best: neither its places nor its headings.
             let (pose, length) = (ends[0], s.length.abs());
-            let apart = pose.distance(start).min(ends[1].distance(start));
-            if apart > length / 2.0 + nearest {
+            let apart = pose.distance(start).min(ends[1].distance(start)) - length / 2.0;
+            let turn_to = |at: Pose| signed_angle(at.heading, start.heading).abs();
+            let turn = turn_to(pose) - length * s.curvature.abs();
+            if apart.max(turn * radius) > nearest {
                 continue;
             }
-            let turn = signed_angle(pose.heading, start.heading).abs();
-            let turns_there = (turn - length * s.curvature.abs()) * radius <= nearest;
-            if turns_there {
-                let steps = (length / (STRIDE * scale)).ceil().max(1.0);
-                for k in 0..steps as usize {
-                    let driven = s.length * k as f64 / steps;
-                    let at = s.at(pose, driven);
-                    let turn = signed_angle(at.heading, start.heading).abs();
-                    let apart = at.distance(start) + turn * radius;
-                    if apart < nearest {
-                        (best, nearest) = (Some((i, driven, at)), apart);
-                    }
+            let steps = (length / (STRIDE * scale)).ceil().max(1.0);
+            for k in 0..steps as usize {
+                let driven = s.length * k as f64 / steps;
+                let at = s.at(pose, driven);
+                let apart = at.distance(start) + turn_to(at) * radius;
+                if apart < nearest {
+                    (best, nearest) = (Some((i, driven, at)), apart);
                 }
             }
         }
@@ -378,8 +375,26 @@ impl LookUp<'_> {
         None
     }
 
+    /// The next plan, as [`LookUp::next`] finds it, or one that costs less where one of the next few costs
+    /// clearly less, and so on; where the cost of some plan is `known`, one that costs clearly less.
+    pub fn cheapest(
+        &mut self,
+        known: Option<f64>,
+        bound: f64,
+        tries: usize,
+    ) -> Option<LibraryPlan> {
+        let mut best = match known {
+            Some(cost) => self.better(cost)?,
+            None => self.next(bound, tries)?,
+        };
+        while let Some(better) = self.better(best.cost) {
+            best = better;
+        }
+        Some(best)
+    }
+
     /// The next plan that costs clearly less than one of this `cost`, if one of the next few does.
-    pub fn better(&mut self, cost: f64) -> Option<LibraryPlan> {
+    fn better(&mut self, cost: f64) -> Option<LibraryPlan> {
         self.next(cost * (1.0 - GAIN), BETTER)
     }
 

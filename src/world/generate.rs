@@ -196,6 +196,9 @@ impl GeneratorConfig {
         number("max_incline", self.max_incline, 0.0, 0.8)?;
         let farthest = EXTENT / length;
         range("start_reach", self.start_reach, -farthest, farthest)?;
+        // Some stand before the spot: ahead of it there may be no room.
+        let nearest = -vehicle.front_extent() / length;
+        number("start_reach[0]", self.start_reach[0], -farthest, nearest)?;
         number("start_heading", self.start_heading, 0.0, PI)?;
         number("start_lane_clearance", self.start_lane_clearance, 0.0, 5.0)?;
         number("start_clearance", self.start_clearance, 0.0, self.start_lane_clearance)

@@ -94,65 +94,73 @@ impl World {
 /// The most scenes of one type and level: they are held in memory.
 pub const MAX_COUNT: usize = 100_000;
 
-/// Generated scenes of a world, a function of the arguments alone: `count` of each type, at home of
-/// each type and level, drawn from `config`. Elsewhere there are no levels.
-pub fn of_world(
-    world: World,
-    config: &GeneratorConfig,
-    vehicle: &Vehicle,
-    kinds: &[ParkingType],
-    levels: &[Level],
-    count: usize,
-    seed: u64,
-) -> Result<Vec<Case>, SuiteError> {
-    match world {
-        World::Home => generated(config, vehicle, kinds, levels, count, seed),
-        World::Lots => {
-            let settings = kinds.iter().flat_map(|&k| (0..count as u64).map(move |i| (k, i)));
-            let case = |(kind, index)| Case {
-                scene: lot(vehicle, kind, seed, index),
-                kind: Some(kind),
-                level: None,
-                set: World::Lots.name().to_owned(),
-            };
-            Ok(settings.map(case).collect())
-        }
-    }
+/// What generated scenes are drawn from, for one vehicle: a function of the fields alone.
+#[derive(Clone, Copy, Debug)]
+pub struct Drawn<'a> {
+    /// What the world [`World::Home`] is drawn from.
+    pub generator: &'a GeneratorConfig,
+    /// The vehicle.
+    pub vehicle: &'a Vehicle,
+    /// Parking types.
+    pub kinds: &'a [ParkingType],
+    /// Levels; only scenes at home have any.
+    pub levels: &'a [Level],
+    /// Scenes of each type, at home of each type and level.
+    pub count: usize,
+    /// Seed.
+    pub seed: u64,
 }
 
-/// What generated scenes are, for reports: `total` of these worlds, `count` of each type and level.
-pub fn title(total: usize, worlds: &[World], count: usize, seed: u64) -> String {
-    match worlds {
-        [World::Home] => format!("{total} generated, {count} of each type and level, seed {seed}"),
-        _ => {
-            let names: Vec<&str> = worlds.iter().map(|w| w.name()).collect();
-            let names = names.join(" and ");
-            format!("{total} generated ({names}), {count} of each type and level, seed {seed}")
+impl Drawn<'_> {
+    /// The scenes of a world.
+    pub fn cases(&self, world: World) -> Result<Vec<Case>, SuiteError> {
+        let Self { generator, vehicle, kinds, levels, count, seed } = *self;
+        if world == World::Home {
+            generator.validate(vehicle)?;
         }
-    }
-}
-
-/// Scenes of the world [`World::Home`].
-pub fn generated(
-    config: &GeneratorConfig,
-    vehicle: &Vehicle,
-    kinds: &[ParkingType],
-    levels: &[Level],
-    count: usize,
-    seed: u64,
-) -> Result<Vec<Case>, SuiteError> {
-    config.validate(vehicle)?;
-    let mut cases = Vec::new();
-    for &kind in kinds {
-        for &level in levels {
-            for index in 0..count as u64 {
-                let scene = generate(config, vehicle, kind, level, seed, index);
-                let set = World::Home.name().to_owned();
-                cases.push(Case { scene, kind: Some(kind), level: Some(level), set });
+        let levels = match world {
+            World::Home => levels.iter().copied().map(Some).collect(),
+            World::Lots => vec![None],
+        };
+        let mut cases = Vec::new();
+        for &kind in kinds {
+            for &level in &levels {
+                for index in 0..count as u64 {
+                    let scene = match level {
+                        Some(level) => generate(generator, vehicle, kind, level, seed, index),
+                        None => lot(vehicle, kind, seed, index),
+                    };
+                    let set = world.name().to_owned();
+                    cases.push(Case { scene, kind: Some(kind), level, set });
+                }
             }
         }
+        Ok(cases)
     }
-    Ok(cases)
+
+    /// What `total` scenes of these worlds are, for reports.
+    pub fn title(&self, total: usize, worlds: &[World]) -> String {
+        let Self { count, seed, .. } = self;
+        let each = if worlds.contains(&World::Home) { "type and level" } else { "type" };
+        let names: Vec<&str> = worlds.iter().map(|w| w.name()).collect();
+        let names = match &names[..] {
+            ["home"] => String::new(),
+            names => format!(" ({})", names.join(" and ")),
+        };
+        format!("{total} generated{names}, {count} of each {each}, seed {seed}")
+    }
+}
+
+/// Scenes at home, as the default generator draws them.
+pub fn at_home(
+    vehicle: &Vehicle,
+    kinds: &[ParkingType],
+    levels: &[Level],
+    count: usize,
+    seed: u64,
+) -> Result<Vec<Case>, SuiteError> {
+    let generator = &GeneratorConfig::default();
+    Drawn { generator, vehicle, kinds, levels, count, seed }.cases(World::Home)
 }
 
 /// What a folder of scene files holds.
@@ -175,6 +183,12 @@ impl Folder {
     }
 }
 
+/// The name of the set of scenes in a folder: the folder's.
+pub fn set_of(dir: &Path) -> String {
+    let real = dir.canonicalize().unwrap_or_else(|_| dir.to_owned());
+    real.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
 /// The scenes of a folder, of one parking type if `kind` is given. Files that hold no scene, or one
 /// whose start or goal is not free on these `terms`, are left out and named. Where that leaves
 /// nothing, or there is nothing, it is an error. Their set has the folder's name.
@@ -184,8 +198,7 @@ pub fn from_folder(
     terms: Terms,
 ) -> Result<Folder, SuiteError> {
     let read = Scene::read_each(dir)?;
-    let real = dir.canonicalize().unwrap_or_else(|_| dir.to_owned());
-    let set = real.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let set = set_of(dir);
     let mut folder = Folder { cases: Vec::new(), unusable: Vec::new(), files: read.len() };
     for (path, scene) in read {
         let scene = match scene {

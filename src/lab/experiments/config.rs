@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 use crate::environment::courses::Course;
 use crate::lab::dataset::{CollectConfig, Subset};
 use crate::lab::evaluation::SuiteConfig;
-use crate::lab::evaluation::suite::{MAX_COUNT, World};
+use crate::lab::evaluation::suite::{self, Drawn, MAX_COUNT, World};
 use crate::lab::training::MlpConfig;
-use crate::lab::training::knn::KnnConfig;
 use crate::lab::training::rl::RlConfig;
+use crate::lab::training::worlds::WorldsConfig;
 use crate::n3p::RolloutConfig;
 use crate::n3p::guided::RankedConfig;
 use crate::n3p::{Method, MethodSettings};
@@ -50,14 +50,17 @@ pub struct ExperimentConfig {
     pub learning_curve: Option<LearningCurveConfig>,
     /// The evaluation.
     pub evaluate: EvaluateConfig,
+    /// Where the file lies: folders of scenes are seen from there.
+    #[serde(skip)]
+    pub folder: PathBuf,
 }
 
 /// What is trained.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TrainConfig {
-    /// The KNN, as in `n3p-train knn`, without `seed`.
-    pub knn: KnnConfig,
+    /// The worlds in which manoeuvres are learnt for the KNN, without `seed`.
+    pub knn: WorldsConfig,
     /// The networks, as in `n3p-train mlp --config`, without `seed`.
     pub mlp: MlpConfig,
     /// The policies, as in `n3p-train rl --config`, without `seed` and `vehicle`.
@@ -157,6 +160,18 @@ impl EvaluateConfig {
         Budget { max_expansions: self.max_expansions, effort: self.effort }
     }
 
+    /// What generated scenes are drawn from.
+    pub(super) fn drawn<'a>(&'a self, vehicle: &'a Vehicle) -> Drawn<'a> {
+        Drawn {
+            generator: &self.generator,
+            vehicle,
+            kinds: &self.types,
+            levels: &self.levels,
+            count: self.count,
+            seed: self.seed,
+        }
+    }
+
     /// Whether the scenes of this set are generated.
     pub(super) fn generates(&self, set: &str) -> bool {
         self.worlds.iter().any(|w| w.name() == set)
@@ -211,10 +226,7 @@ impl ExperimentConfig {
     /// Reads, resolves and checks an experiment.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
         let value = |message| ConfigError::Value { path: path.to_owned(), message };
-        let mut config: Self = read_toml(path)?;
-        for folder in &mut config.evaluate.scenes {
-            *folder = path.with_file_name("").join(&folder);
-        }
+        let config = Self { folder: path.with_file_name(""), ..read_toml(path)? };
         let written: toml::Table = read_toml(path)?;
         if let Some(key) = misplaced(&written) {
             let top = key.rsplit('.').next().unwrap_or(key);
@@ -291,8 +303,8 @@ impl ExperimentConfig {
         if e.scenes.is_empty() || !e.worlds.is_empty() {
             distinct("evaluate.worlds", &e.worlds, |w| w.name())?;
         }
-        let folders = e.scenes.iter().map(|f| f.file_name().unwrap_or_default().to_string_lossy());
-        let sets: Vec<_> = e.worlds.iter().map(|w| w.name().into()).chain(folders).collect();
+        let folders = self.scene_folders().map(|folder| suite::set_of(&folder));
+        let sets: Vec<_> = e.worlds.iter().map(|w| w.name().to_owned()).chain(folders).collect();
         if let Some((_, twice)) = sets.iter().enumerate().find(|(i, s)| sets[..*i].contains(s)) {
             return Err(format!(
                 "evaluate: two sets of scenes are called \"{twice}\"; rename a folder, or leave one out"
@@ -307,6 +319,11 @@ impl ExperimentConfig {
             }
         }
         Ok(())
+    }
+
+    /// The folders of scene files evaluated.
+    pub(super) fn scene_folders(&self) -> impl Iterator<Item = PathBuf> + '_ {
+        self.evaluate.scenes.iter().map(|folder| self.folder.join(folder))
     }
 
     /// Whether anything is collected and trained for.
@@ -342,8 +359,14 @@ fn misplaced(written: &toml::Table) -> Option<&'static str> {
         let first = parts.next().and_then(|p| written.get(p));
         parts.try_fold(first?, |table, part| table.get(part))
     };
-    let misplaced =
-        ["collect.seed", "collect.vehicle", "train.mlp.seed", "train.rl.seed", "train.rl.vehicle"];
+    let misplaced = [
+        "collect.seed",
+        "collect.vehicle",
+        "train.knn.seed",
+        "train.mlp.seed",
+        "train.rl.seed",
+        "train.rl.vehicle",
+    ];
     misplaced.into_iter().find(|p| has(p).is_some())
 }
 
@@ -382,7 +405,16 @@ mod tests {
         assert_eq!(config.evaluate.types.len(), 3);
         assert!(config.learns() && !config.needs_mlp());
         let again: ExperimentConfig = toml::from_str(&config.to_toml()).unwrap();
-        assert_eq!(again, config);
+        assert_eq!(ExperimentConfig { folder: config.folder.clone(), ..again }, config);
+    }
+
+    #[test]
+    fn folders_of_scenes_are_seen_from_the_file_and_written_as_they_are() {
+        let with = MINIMAL.replace("count = 2", "scenes = [\"../lot\"]\ncount = 2");
+        let config = read(&with).unwrap();
+        assert!(config.to_toml().contains("scenes = [\"../lot\"]"), "{}", config.to_toml());
+        let folder = config.scene_folders().next().unwrap();
+        assert!(folder.ends_with("../lot") && folder.starts_with(&config.folder), "{folder:?}");
     }
 
     #[test]
@@ -401,6 +433,7 @@ mod tests {
             (("\"n3p\"", "\"n4p\""), "unknown method"),
             (("\"n3p\"", "\"ha-rs\""), "twice"),
             (("[evaluate]", "[collect]\nseed = 1\n[evaluate]"), "collect.seed"),
+            (("[evaluate]", "[train.knn]\nseed = 1\n[evaluate]"), "train.knn.seed"),
             (("count = 2", "worlds = [\"moon\"]\ncount = 2"), "moon"),
             (("count = 2", "worlds = []\ncount = 2"), "evaluate.worlds is empty"),
             (("count = 2", "scenes = [\"a/home\"]\ncount = 2"), "called \"home\""),

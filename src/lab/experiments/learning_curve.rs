@@ -8,10 +8,10 @@ use crate::episode::Row;
 use crate::lab::dataset::{Dataset, Subset};
 use crate::lab::evaluation::CurvePoint;
 use crate::lab::evaluation::learning_curve::Part;
-use crate::lab::evaluation::suite;
+use crate::lab::evaluation::suite::{self, Drawn, World};
 use crate::lab::progress;
 use crate::lab::training;
-use crate::lab::training::knn::KnnConfig;
+use crate::lab::training::worlds::WorldsConfig;
 use crate::n3p::Models;
 
 /// Trains on `subset` of `data`, keeping the models in `folder`, and plans with them.
@@ -26,7 +26,7 @@ pub(super) fn points(
     let kinds = &config.evaluate.types;
     let knn = folder.join("knn.bin");
     // What data alone is worth.
-    let no_worlds = KnnConfig { worlds: 0, ..config.train.knn };
+    let no_worlds = WorldsConfig { count: 0, ..config.train.knn };
     training::knn::train(&part.metadata, &part.samples, kinds, &no_worlds, &knn)?;
     let mut files = vec![knn];
     if curve.needs_mlp() {
@@ -40,8 +40,8 @@ pub(super) fn points(
     let models = Models::load(&files)?;
     let e = &config.evaluate;
     let suite_config = e.suite(&curve.methods);
-    let cases =
-        suite::generated(&e.generator, &config.vehicle, kinds, &e.levels, curve.count, curve.seed)?;
+    let drawn = Drawn { count: curve.count, seed: curve.seed, ..e.drawn(&config.vehicle) };
+    let cases = drawn.cases(World::Home)?;
     let bar = progress::bar((cases.len() * curve.methods.len()) as u64, "learning curve");
     let rows = suite::run(&cases, &models, &suite_config, 0, |_, _| {
         bar.inc(1);

@@ -356,7 +356,7 @@ impl Runner<'_> {
             let folder = self.path(&format!("learning-curve/{i}"));
             let file = folder.join("points.json");
             let (c, e) = (self.config, &self.config.evaluate);
-            let scenes = (&curve.methods, curve.count, curve.seed, &c.vehicle);
+            let scenes = (&curve.methods, curve.count, curve.seed, &c.vehicle, &e.generator);
             let planning = (&e.types, &e.levels, e.max_expansions, e.effort, &e.planner, &e.n3p);
             let settings = settings((&stage, data, part, scenes, planning, &c.train.mlp));
             let known = read_points(&file);
@@ -443,20 +443,10 @@ impl Runner<'_> {
         let suite_config = e.suite(&e.methods);
         let mut cases = Vec::new();
         for &world in &e.worlds {
-            let vehicle = &self.config.vehicle;
-            let of_world = suite::of_world(
-                world,
-                &e.generator,
-                vehicle,
-                &e.types,
-                &e.levels,
-                e.count,
-                e.seed,
-            )?;
-            cases.extend(of_world);
+            cases.extend(e.drawn(&self.config.vehicle).cases(world)?);
         }
-        for folder in &e.scenes {
-            let found = suite::from_folder(folder, None, suite_config.terms())?;
+        for folder in self.config.scene_folders() {
+            let found = suite::from_folder(&folder, None, suite_config.terms())?;
             // A record is of all its scenes or of none.
             if let Some(first) = found.unusable.first() {
                 return Err(SuiteError::NoScenes(first.clone()).into());
@@ -495,10 +485,12 @@ impl Runner<'_> {
         })?;
         bar.finish_and_clear();
         rows.extend(new);
+        let generated = (!e.worlds.is_empty())
+            .then(|| e.drawn(&self.config.vehicle).title(cases.len() - files.len(), &e.worlds));
+        let read = (!files.is_empty()).then(|| format!("{} from files", files.len()));
         let scenes = format!(
-            "{}{}; {}",
-            suite::title(cases.len() - files.len(), &e.worlds, e.count, e.seed),
-            if files.is_empty() { String::new() } else { format!("; {} from files", files.len()) },
+            "{}; {}",
+            generated.into_iter().chain(read).collect::<Vec<_>>().join("; "),
             match (&self.given.models, &self.given.data) {
                 (Some(models), _) => format!("models from {}", models.display()),
                 (None, Some(data)) => {

@@ -7,13 +7,12 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::curve::{self, EpochLoss};
-use super::knn::KnnConfig;
 use super::library::{Source, condense};
 use super::mlp::{LEAST_SAMPLES, split};
 use super::quality::{Errors, Reach, errors, reach};
 use super::regression::{Rows, Trainable, fit, predictions};
 use super::targets::{self, Example};
-use super::worlds::Worlds;
+use super::worlds::WorldsConfig;
 use super::{MlpConfig, TrainingError, card, solved, write_beside};
 use crate::geometry::Pose;
 use crate::lab::dataset::{Dataset, Sample};
@@ -34,7 +33,7 @@ pub struct FleetLog {
     /// Settings of the networks' training.
     pub config: MlpConfig,
     /// The worlds that manoeuvres were learnt in.
-    pub worlds: KnnConfig,
+    pub worlds: WorldsConfig,
     /// Parking type by parking type.
     pub kinds: Vec<FleetKindLog>,
     /// Size of the model, bytes.
@@ -73,7 +72,7 @@ pub struct FleetKindLog {
 pub fn train(
     sets: &[Dataset],
     config: &MlpConfig,
-    worlds: &KnnConfig,
+    worlds: &WorldsConfig,
     out: &Path,
 ) -> Result<FleetLog, TrainingError> {
     config.validate()?;
@@ -82,18 +81,10 @@ pub fn train(
     for kind in ParkingType::ALL {
         solved.push((kind, solved_of(sets, kind)?));
     }
-    let progress = worlds.progress(ParkingType::ALL.len());
-    let learnt_in = Worlds { count: worlds.worlds, seed: worlds.seed, progress: &progress };
-    let condensed: Vec<UnitManoeuvres> = std::thread::scope(|scope| {
-        let learn = |(kind, of_sets): (ParkingType, &Vec<Vec<&Sample>>)| {
-            let sources = sources(sets, of_sets);
-            learnt_in.learn(kind, condense(kind, &sources), &sources)
-        };
-        let condense = |(kind, of_sets)| scope.spawn(move || learn((kind, of_sets)));
-        let running: Vec<_> = solved.iter().map(|(k, of_sets)| condense((*k, of_sets))).collect();
-        running.into_iter().map(|r| r.join().expect("condensing does not panic")).collect()
+    let condensed = worlds.learn(&solved, |(kind, of_sets), worlds| {
+        let sources = sources(sets, of_sets);
+        worlds.learn(*kind, condense(*kind, &sources), &sources)
     });
-    progress.finish_and_clear();
     let (mut scaling, mut networks, mut logs) = (Vec::new(), Vec::new(), Vec::new());
     for ((kind, of_sets), manoeuvres) in solved.iter().zip(&condensed) {
         let learnt = learn(sets, *kind, of_sets, config, manoeuvres.len())?;

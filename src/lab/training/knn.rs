@@ -2,49 +2,18 @@
 
 use std::path::Path;
 
-use indicatif::ProgressBar;
 use serde::{Deserialize, Serialize};
 
 pub use super::leave_one_out::LeaveOneOut;
 use super::leave_one_out::leave_one_out;
 use super::library::{self, Source};
-use super::worlds::Worlds;
-use super::{TrainingError, card, settings, solved, write_beside};
+use super::worlds::WorldsConfig;
+use super::{TrainingError, card, solved, write_beside};
 use crate::geometry::Pose;
 use crate::lab::dataset::{Metadata, Sample, content_sha256};
-use crate::lab::progress;
 use crate::selectors::artefact;
 use crate::selectors::knn_file::{self, KindHeader, KnnEntries, KnnEntry, KnnHeader};
 use crate::world::ParkingType;
-
-/// What is learnt beside the samples. Every setting may be left out of a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct KnnConfig {
-    /// Generated worlds of each type in which manoeuvres are learnt, 0 to 10⁶; see `worlds`.
-    pub worlds: u32,
-    /// Seed of the worlds.
-    pub seed: u64,
-}
-
-impl Default for KnnConfig {
-    fn default() -> Self {
-        Self { worlds: 12_000, seed: 1 }
-    }
-}
-
-impl KnnConfig {
-    /// Checks every setting.
-    pub fn validate(&self) -> Result<(), TrainingError> {
-        let within = self.worlds <= 1_000_000;
-        settings::check("worlds", within, self.worlds.to_string(), "0 to 1000000")
-    }
-
-    /// A bar for the worlds of so many parking types.
-    pub(super) fn progress(&self, kinds: usize) -> ProgressBar {
-        progress::bar(2 * u64::from(self.worlds) * kinds as u64, "worlds")
-    }
-}
 
 /// What was stored; written as JSON beside the model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -53,8 +22,8 @@ pub struct KnnLog {
     pub data_sha256: String,
     /// Seed of the data set.
     pub seed: u64,
-    /// What was learnt beside the samples.
-    pub config: KnnConfig,
+    /// The worlds that manoeuvres were learnt in, beside the samples.
+    pub worlds: WorldsConfig,
     /// Metres per radian of the metric's heading part; see [`crate::selectors::knn`].
     pub heading_radius: f64,
     /// Size of the file, bytes.
@@ -91,10 +60,10 @@ pub fn train(
     metadata: &Metadata,
     samples: &[Sample],
     kinds: &[ParkingType],
-    config: &KnnConfig,
+    worlds: &WorldsConfig,
     out: &Path,
 ) -> Result<KnnLog, TrainingError> {
-    config.validate()?;
+    worlds.validate()?;
     let mut known = Vec::new();
     for &kind in kinds {
         let solved = solved(samples, kind, metadata.grid.cell_count(kind))?;
@@ -104,18 +73,11 @@ pub fn train(
         known.push((kind, solved));
     }
     let heading_radius = metadata.vehicle.turning_radius() / 2.0;
-    let progress = config.progress(kinds.len());
-    let worlds = Worlds { count: config.worlds, seed: config.seed, progress: &progress };
-    let learnt: Vec<_> = std::thread::scope(|scope| {
-        let learn = |(kind, solved): &(ParkingType, Vec<&Sample>)| {
-            let sources = [Source { metadata, solved, unit: 1.0 }];
-            let manoeuvres = worlds.learn(*kind, library::condense(*kind, &sources), &sources);
-            (manoeuvres, leave_one_out(metadata, solved, heading_radius))
-        };
-        let running: Vec<_> = known.iter().map(|k| scope.spawn(move || learn(k))).collect();
-        running.into_iter().map(|r| r.join().expect("learning does not panic")).collect()
+    let learnt = worlds.learn(&known, |(kind, solved), worlds| {
+        let sources = [Source { metadata, solved, unit: 1.0 }];
+        let manoeuvres = worlds.learn(*kind, library::condense(*kind, &sources), &sources);
+        (manoeuvres, leave_one_out(metadata, solved, heading_radius))
     });
-    progress.finish_and_clear();
     let mut headers = Vec::new();
     let mut entries = Vec::new();
     let mut logs = Vec::new();
@@ -156,8 +118,8 @@ pub fn train(
     let bytes = knn_file::encode(&header, &entries);
     artefact::write(out, &bytes)?;
     let (data_sha256, seed) = (header.data_sha256, header.seed);
-    let config = *config;
-    let log = KnnLog { data_sha256, seed, config, heading_radius, bytes: bytes.len(), kinds: logs };
+    let worlds = *worlds;
+    let log = KnnLog { data_sha256, seed, worlds, heading_radius, bytes: bytes.len(), kinds: logs };
     write_beside(out, &log, card::knn(out, metadata, &log))?;
     Ok(log)
 }

@@ -1,6 +1,6 @@
 //! Rows of a data set → model files.
 //!
-//! [`knn`] stores samples and a [`library`] of their manoeuvres and of those of many `worlds`; [`mlp`] trains a network
+//! [`knn`] stores samples and a [`library`] of their manoeuvres and of those of many [`worlds`]; [`mlp`] trains a network
 //! (`targets` says what it is to learn, `regression` fits it). Both take samples and metadata of
 //! one data set; [`fleet`] does both for the data sets of several vehicles. All write an artefact
 //! that [`crate::selectors`] loads. Beside it they leave what programs
@@ -20,7 +20,7 @@ mod regression;
 pub mod rl;
 mod settings;
 mod targets;
-mod worlds;
+pub mod worlds;
 
 pub use mlp_config::{Loss, MlpConfig, Schedule, Targets, Validation};
 

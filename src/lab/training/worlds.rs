@@ -8,10 +8,13 @@
 
 use indicatif::ProgressBar;
 use rand::RngExt;
+use serde::{Deserialize, Serialize};
 
 use super::library::Source;
+use super::{TrainingError, settings};
 use crate::curves::Segment;
 use crate::lab::dataset::Metadata;
+use crate::lab::progress;
 use crate::planners::cost::CostModel;
 use crate::planners::library::{Library, LibrarySearch, Verdicts};
 use crate::planners::{Budget, Effort, HybridAStar, Planner, Problem};
@@ -26,15 +29,54 @@ const GOOD: f64 = 1.05;
 /// Solutions that the teacher takes the best of.
 const SOLUTIONS: usize = 5;
 
-/// Worlds to learn in.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Worlds<'a> {
-    /// How many of each parking type.
+/// Worlds to learn in. Every setting may be left out of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct WorldsConfig {
+    /// How many of each parking type, 0 to 10⁶.
+    #[serde(rename = "worlds")]
     pub count: u32,
     /// What they are drawn from.
     pub seed: u64,
+}
+
+impl Default for WorldsConfig {
+    fn default() -> Self {
+        Self { count: 12_000, seed: 1 }
+    }
+}
+
+impl WorldsConfig {
+    /// Checks every setting.
+    pub fn validate(&self) -> Result<(), TrainingError> {
+        let within = self.count <= 1_000_000;
+        settings::check("worlds", within, self.count.to_string(), "0 to 1000000")
+    }
+
+    /// What is learnt of each of `kinds`, side by side, with a bar that counts the worlds.
+    pub(super) fn learn<K: Sync, T: Send>(
+        &self,
+        kinds: &[K],
+        of_kind: impl Fn(&K, &Worlds) -> T + Sync,
+    ) -> Vec<T> {
+        let progress = progress::bar(2 * u64::from(self.count) * kinds.len() as u64, "worlds");
+        let worlds = Worlds { config: *self, progress: &progress };
+        let learnt = std::thread::scope(|scope| {
+            let (of_kind, worlds) = (&of_kind, &worlds);
+            let begin = |kind| scope.spawn(move || of_kind(kind, worlds));
+            let running: Vec<_> = kinds.iter().map(begin).collect();
+            running.into_iter().map(|r| r.join().expect("learning does not panic")).collect()
+        });
+        progress.finish_and_clear();
+        learnt
+    }
+}
+
+/// Worlds that are being learnt in.
+pub(super) struct Worlds<'a> {
+    config: WorldsConfig,
     /// Counts each of them twice.
-    pub progress: &'a ProgressBar,
+    progress: &'a ProgressBar,
 }
 
 impl Worlds<'_> {
@@ -47,41 +89,55 @@ impl Worlds<'_> {
         mut manoeuvres: Vec<Vec<Segment>>,
         sources: &[Source],
     ) -> Vec<Vec<Segment>> {
-        if self.count == 0 {
+        if self.config.count == 0 {
             return manoeuvres;
         }
         let mut pupils: Vec<Pupil> = sources.iter().map(|s| Pupil::new(s, &manoeuvres)).collect();
-        for index in 0..self.count {
-            self.progress.inc(1);
-            let at = index as usize % pupils.len();
-            let Some(problem) = self.world(sources[at].metadata, kind, index) else { continue };
-            if let Some(learnt) = pupils[at].lesson(&problem) {
+        self.for_each(kind, sources, |at, problem| {
+            if let Some(learnt) = pupils[at].lesson(problem) {
                 let learnt = scaled(&learnt, 1.0 / sources[at].unit);
                 for (pupil, source) in pupils.iter_mut().zip(sources) {
                     pupil.library.add(scaled(&learnt, source.unit), &pupil.model);
                 }
                 manoeuvres.push(learnt);
             }
-        }
+        });
         let mut uses = vec![0_u32; manoeuvres.len()];
-        for index in 0..self.count {
-            self.progress.inc(1);
-            let at = index as usize % pupils.len();
-            let Some(problem) = self.world(sources[at].metadata, kind, index) else { continue };
-            if let Some(used) = pupils[at].used(&problem) {
+        self.for_each(kind, sources, |at, problem| {
+            if let Some(used) = pupils[at].used(problem) {
                 uses[used] += 1;
             }
-        }
+        });
         let mut order: Vec<usize> = (0..manoeuvres.len()).filter(|&i| uses[i] > 0).collect();
         order.sort_by_key(|&i| std::cmp::Reverse(uses[i]));
         order.into_iter().map(|i| std::mem::take(&mut manoeuvres[i])).collect()
     }
 
+    /// Calls `each` with the number of a source and a world for its vehicle, turn by turn.
+    fn for_each(
+        &self,
+        kind: ParkingType,
+        sources: &[Source],
+        mut each: impl FnMut(usize, &Problem),
+    ) {
+        for index in 0..self.config.count {
+            self.progress.inc(1);
+            let at = index as usize % sources.len();
+            if let Some(problem) = self.world(&sources[at].metadata.vehicle, kind, index) {
+                each(at, &problem);
+            }
+        }
+    }
+
     /// The world of a number; `None` where its sizes leave no room for the vehicle.
-    fn world(&self, metadata: &Metadata, kind: ParkingType, index: u32) -> Option<Problem> {
-        let vehicle = &metadata.vehicle;
-        let place = ParkingType::ALL.iter().position(|&k| k == kind)? as u64;
-        let mut rng = rng(self.seed, Stream::World, u64::from(index) << 8 | place);
+    fn world(&self, vehicle: &Vehicle, kind: ParkingType, index: u32) -> Option<Problem> {
+        // Which of the random streams it is: part of what models are made of, so never renumbered.
+        let number = match kind {
+            ParkingType::Forward => 0,
+            ParkingType::Parallel => 1,
+            ParkingType::Reverse => 2,
+        };
+        let mut rng = rng(self.config.seed, Stream::World, u64::from(index) << 8 | number);
         let mut between = |min: f64, max: f64| rng.random_range(min..=max);
         let config = drawn(vehicle, &mut between);
         config.validate(vehicle).ok()?;
@@ -171,10 +227,6 @@ impl Pupil {
         let direct = self.teacher.direct(problem, problem.start, &goal).map(|leg| leg.cost);
         let any = direct.unwrap_or(f64::INFINITY);
         let mut look_up = search.look_up(library, verdicts, problem, model, any);
-        let mut best = look_up.next(any, usize::MAX)?;
-        while let Some(better) = look_up.better(best.cost) {
-            best = better;
-        }
-        Some(best.manoeuvre)
+        look_up.cheapest(None, any, usize::MAX).map(|plan| plan.manoeuvre)
     }
 }

@@ -3,9 +3,9 @@
 use super::GuidedPlanner;
 use crate::curves::{Path, Segment};
 use crate::planners::cost::CostModel;
-use crate::planners::hybrid_astar::{GoalSet, Leg};
+use crate::planners::hybrid_astar::{GoalSet, HybridAStar, Leg};
 use crate::planners::library::{Library, LibraryPlan};
-use crate::planners::{Guidance, Problem, Route};
+use crate::planners::{Effort, Guidance, Problem, Route};
 use crate::world::ParkingType;
 use crate::world::abstraction::abstractions;
 use crate::world::cell::Grid;
@@ -16,27 +16,25 @@ const LIBRARIES: usize = 6;
 /// where these do not do as usual.
 const COMMON: usize = 400;
 /// Known manoeuvres, free in the scene, that `n3p` tries to join before it asks for the curve
-/// straight to the goal, and then once more for something cheaper: most plans take the first.
+/// straight to the goal, and then once more for something cheaper: most plans take the first. And those
+/// it tries where there is no such curve: each takes some microseconds, together they take a quarter of
+/// what a search usually does.
 const FIRST_TRIES: usize = 16;
+const TRIES: usize = 64;
 /// A plan that costs at most so many times the estimate of the best known one (which knows nothing
 /// of joints and obstacles) or the least cost through empty space is taken as it is, unless it
 /// passes something near on its way.
 const USUAL: f64 = 1.3;
-pub(super) const ENOUGH: f64 = 1.1;
 /// What costs more than this many times the estimate is looked at again, the second by a spot that no
 /// usual cell stands for.
 const DEAR: f64 = 3.0;
-const DEAR_BY_UNUSUAL: f64 = 2.0;
-/// Changes of gear that a parallel spot may take more than the curve through empty space.
+pub(super) const DEAR_BY_UNUSUAL: f64 = 2.0;
+/// Changes of gear that a parallel spot takes at most as a rule, and a bay.
 const TO_AND_FRO: usize = 4;
-/// Changes of gear that a bay takes as a rule.
 const INTO_A_BAY: usize = 2;
 /// Where the lane begins farther out than this beyond a usual spot's, metres for the default vehicle,
 /// manoeuvres are tried that end farther out, too.
 const DEEPER: f64 = 0.3;
-/// Those it tries where there is no such curve. Each takes some microseconds, together they take a
-/// quarter of what a search usually does; generated scenes need 24 of them at most.
-const TRIES: usize = 64;
 /// Those that it tries to join by a long way round, where no other plan was found.
 const LONG_WAYS: usize = 8;
 
@@ -49,6 +47,47 @@ pub(super) struct Prepared {
     straights: usize,
     /// Manoeuvres that are rarely of use.
     rare: Library,
+}
+
+impl Prepared {
+    /// Whether it was made ready for such problems.
+    fn serves(&self, problem: &Problem) -> bool {
+        problem.kind == Some(self.kind) && self.library.fits(problem)
+    }
+}
+
+/// What plans of one problem are held against, found out once, where it is asked for.
+pub(super) struct Standard<'a> {
+    problem: &'a Problem,
+    goal: &'a GoalSet,
+    enough: Option<f64>,
+    unusual: Option<bool>,
+}
+
+impl<'a> Standard<'a> {
+    pub(super) fn new(problem: &'a Problem, goal: &'a GoalSet) -> Self {
+        Self { problem, goal, enough: None, unusual: None }
+    }
+
+    /// Cost that any plan may have: little more than the least through empty space.
+    pub(super) fn enough(&mut self, hars: &mut HybridAStar) -> f64 {
+        let Self { problem, goal, .. } = *self;
+        let enough = || Effort::Usual.enough() * hars.lower_bound(problem, goal);
+        *self.enough.get_or_insert_with(enough)
+    }
+
+    /// Whether no usual cell stands for the spot as it is. Of the vehicle's size: one model may serve
+    /// vehicles of any.
+    pub(super) fn is_unusual(&mut self) -> bool {
+        let problem = self.problem;
+        let scale = problem.vehicle.scale();
+        let has_cell = |kind| {
+            let grid = Grid::default().scaled(scale);
+            !abstractions(&problem.obstacles, kind, &grid).is_empty()
+        };
+        let unusual = |kind| problem.mouth > DEEPER * scale || !has_cell(kind);
+        *self.unusual.get_or_insert_with(|| problem.kind.is_some_and(unusual))
+    }
 }
 
 /// A plan that took no search.
@@ -100,8 +139,8 @@ impl GuidedPlanner {
             best = best.or_else(|| look_up.long_way(any, LONG_WAYS).map(by_manoeuvre));
         }
         // What is estimated to cost less than the best so far may do so.
-        while let Some(known) = &best
-            && let Some(better) = look_up.better(known.cost)
+        if let Some(known) = &best
+            && let Some(better) = look_up.cheapest(Some(known.cost), any, FIRST_TRIES)
         {
             best = Some(by_manoeuvre(better));
         }
@@ -116,7 +155,7 @@ impl GuidedPlanner {
         &mut self,
         problem: &Problem,
         model: &CostModel,
-        mut best: Option<Known>,
+        best: Option<Known>,
         least: f64,
     ) -> Option<Known> {
         let Self { libraries, library_search, verdicts, .. } = self;
@@ -124,15 +163,11 @@ impl GuidedPlanner {
         verdicts.clear();
         let bound = best.as_ref().map_or(f64::INFINITY, |known| known.cost);
         let mut look_up = library_search.look_up(rare, verdicts, problem, model, bound);
-        loop {
-            let found = match &best {
-                Some(known) => look_up.better(known.cost),
-                None => look_up.next(bound, TRIES),
-            };
-            let Some(LibraryPlan { path, cost, preparatory, .. }) = found else { return best };
-            let guidance = Guidance { preparatory: Some(preparatory), route: Route::Library };
-            best = Some(Known { path, cost, guidance, least });
-        }
+        let known = best.as_ref().map(|known| known.cost);
+        let Some(plan) = look_up.cheapest(known, bound, TRIES) else { return best };
+        let LibraryPlan { path, cost, preparatory, .. } = plan;
+        let guidance = Guidance { preparatory: Some(preparatory), route: Route::Library };
+        Some(Known { path, cost, guidance, least })
     }
 
     /// The best so far, or a plan by a manoeuvre that ends where a usual bay's goal would be, farther
@@ -141,7 +176,7 @@ impl GuidedPlanner {
         &mut self,
         problem: &Problem,
         model: &CostModel,
-        mut best: Option<Known>,
+        best: Option<Known>,
     ) -> Option<Known> {
         let [gear] = problem.entry_gears() else { return best };
         if problem.mouth <= DEEPER * problem.vehicle.scale() {
@@ -159,27 +194,20 @@ impl GuidedPlanner {
         let in_cost = model.per_metre(*gear) * problem.mouth;
         let mut look_up = library_search.look_up_at(library, verdicts, problem, end, model, any);
         let (least, _) = look_up.least_estimates(library.len());
-        loop {
-            let found = match &best {
-                Some(known) => look_up.better(known.cost - in_cost),
-                None => look_up.next(any, FIRST_TRIES),
-            };
-            let Some(LibraryPlan { mut path, preparatory, .. }) = found else {
-                return best;
-            };
-            path.extend([straight]);
-            let cost = model.path(&problem.vehicle, &path.segments);
-            let guidance = Guidance { preparatory: Some(preparatory), route: Route::Library };
-            let least = best.as_ref().map_or(least + in_cost, |b| b.least.min(least + in_cost));
-            best = Some(Known { path, cost, guidance, least });
-        }
+        let known = best.as_ref().map(|known| known.cost - in_cost);
+        let Some(plan) = look_up.cheapest(known, any, FIRST_TRIES) else { return best };
+        let LibraryPlan { mut path, preparatory, .. } = plan;
+        path.extend([straight]);
+        let cost = model.path(&problem.vehicle, &path.segments);
+        let guidance = Guidance { preparatory: Some(preparatory), route: Route::Library };
+        let least = best.map_or(f64::INFINITY, |known| known.least).min(least + in_cost);
+        Some(Known { path, cost, guidance, least })
     }
 
     /// Puts the library for `problem` first, prepared if need be, and says whether there is one.
     pub(super) fn prepare_library(&mut self, problem: &Problem) -> bool {
         let Some(kind) = problem.kind else { return false };
-        let fits = |p: &Prepared| p.kind == kind && p.library.fits(problem);
-        match self.libraries.iter().position(fits) {
+        match self.libraries.iter().position(|p| p.serves(problem)) {
             Some(at) => self.libraries[..=at].rotate_right(1),
             None => {
                 let (vehicle, footprint) = (&problem.vehicle, *problem.collision.footprint());
@@ -202,42 +230,18 @@ impl GuidedPlanner {
     /// Whether a plan costs no more than usual: what is known of the spot says what it takes, by a usual
     /// one within wide limits, as manoeuvres for it were learnt in many worlds; where that is little, the
     /// curve through empty space does.
-    pub(super) fn is_usual(&mut self, problem: &Problem, goal: &GoalSet, known: &Known) -> bool {
-        known.cost <= USUAL * known.least
-            || (known.path.direction_changes() <= most_changes(problem.kind)
-                && (known.cost <= DEAR_BY_UNUSUAL * known.least
-                    || known.cost <= DEAR * known.least && !self.is_unusual(problem)))
-            || known.cost <= ENOUGH * self.hars.lower_bound(problem, goal)
-    }
-
-    /// Whether a plan costs more than usual by a spot that no cell of the model stands for.
-    pub(super) fn is_unusually_dear(
-        &mut self,
-        problem: &Problem,
-        goal: &GoalSet,
-        cost: f64,
-        least: f64,
-    ) -> bool {
-        cost > DEAR_BY_UNUSUAL * least
-            && cost > ENOUGH * self.hars.lower_bound(problem, goal)
-            && self.is_unusual(problem)
-    }
-
-    /// Whether no usual cell stands for the spot as it is. Of the vehicle's size: one model may serve
-    /// vehicles of any.
-    pub(super) fn is_unusual(&self, problem: &Problem) -> bool {
-        let scale = problem.vehicle.scale();
-        problem.kind.is_some_and(|kind| {
-            let grid = || Grid::default().scaled(scale);
-            problem.mouth > DEEPER * scale
-                || abstractions(&problem.obstacles, kind, &grid()).is_empty()
-        })
+    pub(super) fn is_usual(&mut self, known: &Known, standard: &mut Standard) -> bool {
+        let (times, kind) = (known.cost / known.least, standard.problem.kind);
+        times <= USUAL
+            || (known.path.direction_changes() <= most_changes(kind)
+                && (times <= DEAR_BY_UNUSUAL || times <= DEAR && !standard.is_unusual()))
+            || known.cost <= standard.enough(&mut self.hars)
     }
 
     /// What is known, or the rest of the manoeuvre that the car stands in where that costs less: who
     /// replans on the way goes on.
     pub(super) fn or_rest(&mut self, problem: &Problem, known: Known) -> Known {
-        let prepared = self.libraries.first().filter(|p| p.library.fits(problem));
+        let prepared = self.libraries.first().filter(|p| p.serves(problem));
         let Some(Prepared { library, rare, .. }) = prepared else { return known };
         let model = self.hars.cost(&problem.vehicle);
         [library, rare].into_iter().fold(known, |known, library| {

@@ -64,7 +64,7 @@ impl Park {
         let goal = plan.goal(kind, draw, &things)?;
         let along = match kind {
             // To turn round there is rarely the room.
-            ParkingType::Parallel => Some(plan.is_ahead(goal)),
+            ParkingType::Parallel => Some(goal.heading.cos() > 0.0),
             ParkingType::Forward | ParkingType::Reverse => None,
         };
         let start = plan.start(ends, along, draw, &things)?;
@@ -251,36 +251,32 @@ impl<'a> Plan<'a> {
         let turn = match kind {
             ParkingType::Forward => PI,
             ParkingType::Reverse => 0.0,
-            ParkingType::Parallel => draw.number(0..2).into(),
+            ParkingType::Parallel => f64::from(draw.number(0..2)) * PI,
         };
-        let turn = if kind == ParkingType::Parallel { turn * PI } else { turn };
         let error = if draw.chance(0.7) { draw.about(PI / 180.0) } else { 0.0 };
         // From the spot's middle: in the direction in which there is room to choose, and across it.
         let depth = self.row.depth;
-        let (slack, least, at): (f64, f64, Box<dyn Fn(f64) -> Pose>) = match self.row.style {
+        let (slack, least, out) = match self.row.style {
             Style::Bays { .. } => {
                 let slack = (depth - length) / 2.0;
                 let out = draw.between(0.15 - slack, slack + self.row.stick_out.min(0.1));
-                let at = move |beside| Pose::new(out, beside, turn + error);
-                ((self.row.width - width) / 2.0, 0.2, Box::new(at))
+                ((self.row.width - width) / 2.0, 0.2, out)
             }
             Style::Parallel => {
                 let kerb = draw.between(0.16, 0.4).min(depth - width);
                 let out = self.row.away * ((depth - width) / 2.0 - kerb);
-                let at = move |along| Pose::new(along, out, turn + error);
-                ((self.row.width - length) / 2.0, 0.55, Box::new(at))
+                ((self.row.width - length) / 2.0, 0.55, out)
             }
+        };
+        let at = |shift| match self.row.style {
+            Style::Bays { .. } => Pose::new(out, shift, turn + error),
+            Style::Parallel => Pose::new(shift, out, turn + error),
         };
         let body = self.vehicle.footprint(GOAL_CLEARANCE);
         let pose = |shift| self.vehicle.rear_axle(spot.compose(at(shift)));
         let [low, high] = longest_run(slack, |shift| things.leave(pose(shift), &body))
             .filter(|[low, high]| high - low >= least)?;
         Some(pose(draw.between(low + 0.15 * (high - low), high - 0.15 * (high - low))))
-    }
-
-    /// Whether a pose near the target faces the road's direction.
-    fn is_ahead(&self, pose: Pose) -> bool {
-        pose.heading.cos() > 0.0
     }
 
     /// A free pose in the lane; `ahead`: whether it must face the road's direction, or must not.

@@ -60,7 +60,8 @@ For each parking type a network, {layers} with ReLU between layers, from
 
 - **No guarantee that one fits**: a vehicle of other proportions than those below may need a search
   more often. Its path is checked all the same.
-- Taken from this planner's own solutions in free space that is two rectangles, not from drivers.
+- Taken from this planner's own solutions in free space that is two rectangles, manoeuvres also from
+  those in generated scenes, each for one of the vehicles in turn; not from drivers.
 
 ## Learnt from
 

@@ -22,7 +22,7 @@ pub(in crate::lab::training) fn knn(out: &Path, metadata: &Metadata, log: &KnnLo
         let (occupied, cells) = (k.occupied_cells, k.cells);
         let _ = writeln!(stored, "| {kind} | {samples} | {occupied} of {cells} | {manoeuvres} |");
     }
-    let learnt = in_worlds(&log.config);
+    let learnt = in_worlds(&log.worlds);
     let judged =
         |k: &KnnKindLog| k.leave_one_out.map(|l| (k.kind, l.reach.rows, l.errors, l.reach));
     let metrics = metrics(&log.kinds.iter().filter_map(judged).collect::<Vec<_>>());
@@ -61,7 +61,8 @@ are compared as points (x, y, r·cos θ, r·sin θ) with r = {radius:.4} m: half
 - **One vehicle**: {vehicle}. It serves
   vehicles that this one covers, too (docs/vehicles.md); for any other the model is refused.
 - **Cells of the grid below.** Smaller spots, lanes and dead ends have no cell, hence no answer.
-- Taken from this planner's own solutions in free space that is two rectangles, not from drivers.
+- Taken from this planner's own solutions in free space that is two rectangles, manoeuvres also from
+  those in generated scenes; not from drivers.
 
 {data}
 ## What is stored

@@ -14,8 +14,8 @@ pub(super) use fleet::fleet;
 pub(super) use knn::knn;
 pub(super) use mlp::mlp;
 
-use super::knn::KnnConfig;
 use super::quality::{Errors, Reach};
+use super::worlds::WorldsConfig;
 use crate::lab::dataset::Metadata;
 use crate::world::ParkingType;
 use crate::world::cell::Axis;
@@ -89,11 +89,11 @@ stands for none at all.
 }
 
 /// What manoeuvres serve.
-fn in_worlds(KnnConfig { worlds, seed }: &KnnConfig) -> String {
-    match worlds {
+fn in_worlds(WorldsConfig { count, seed }: &WorldsConfig) -> String {
+    match count {
         0 => "The manoeuvres are those that serve many rows.".to_owned(),
         _ => format!(
-            "The manoeuvres are those that serve\n{worlds} generated worlds of each type (seed {seed}), \
+            "The manoeuvres are those that serve\n{count} generated worlds of each type (seed {seed}), \
              their sizes drawn far wider than those of any level;\nwhat is used most comes first."
         ),
     }
@@ -225,8 +225,8 @@ mod tests {
             leave_one_out,
         };
         let (data_sha256, heading_radius) = ("abc123".to_owned(), 2.25);
-        let config = KnnConfig { worlds: 300, seed: 5 };
-        KnnLog { data_sha256, seed: 77, config, heading_radius, bytes: 3 << 19, kinds: vec![kind] }
+        let worlds = WorldsConfig { count: 300, seed: 5 };
+        KnnLog { data_sha256, seed: 77, worlds, heading_radius, bytes: 3 << 19, kinds: vec![kind] }
     }
 
     fn assert_tells(card: &str, parts: &[&str]) {
