@@ -39,6 +39,8 @@ pub enum Stream {
     Clutter = 13,
     /// An unusual bay.
     Bay = 14,
+    /// A generated scene of an angled bay.
+    Angled = 15,
 }
 
 /// The generator of `(seed, stream, index)`.

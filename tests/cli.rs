@@ -280,7 +280,7 @@ fn rows_do_not_depend_on_the_threads() {
             .args(["--out", threads, "--paths", "paths"])
             .assert()
             .success()
-            .stdout(contains("No failures in 18 rows"));
+            .stdout(contains("No failures in 24 rows"));
         let rows = rows::read_csv(&dir.path().join(threads).join("rows.csv")).unwrap();
         rows.iter().map(n3p::episode::Row::untimed).collect::<Vec<_>>()
     };

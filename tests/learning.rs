@@ -19,8 +19,8 @@ use n3p::selectors::model::Model;
 use n3p::selectors::network::{LAYERS, LayerWeights, pose_from_outputs};
 use n3p::selectors::{Features, Normaliser, PoseSelector, UNIT_COUNT, UNIT_NAMES};
 use n3p::vehicle::Vehicle;
-use n3p::world::ParkingType;
 use n3p::world::cell::{Axis, Grid};
+use n3p::world::{ParkingType, Stance};
 use proptest::prelude::*;
 use rand::RngExt;
 
@@ -104,7 +104,7 @@ fn samples(kind: ParkingType, cells: &[usize], per_cell: usize, seed: u64) -> Ve
 
 fn knn_of(samples: &[Sample], kinds: &[ParkingType], dir: &Path) -> KnnSelector {
     let path = dir.join("knn.bin");
-    training::knn::train(&metadata(), samples, kinds, &path).unwrap();
+    training::knn::train(&metadata(), samples, kinds, u32::MAX, &path).unwrap();
     KnnSelector::load(&path).unwrap()
 }
 
@@ -233,7 +233,8 @@ fn one_file_holds_all_types_and_the_same_input_gives_the_same_bytes() {
     let error = training::knn::train(
         &metadata(),
         &samples(KIND, &[0], 5, 1),
-        &ParkingType::ALL,
+        &ParkingType::SQUARE,
+        u32::MAX,
         &dir.path().join("other.bin"),
     );
     assert!(matches!(error, Err(TrainingError::NoSamples(ParkingType::Forward))));
@@ -552,7 +553,7 @@ fn one_network_learns_from_several_vehicles_reproducibly() {
     for of_kind in &log.kinds {
         let kind = of_kind.kind;
         assert!(dir.path().join(format!("a.{kind}.training.svg")).exists());
-        let solved = || sets.iter().flat_map(|s| s.solved()).filter(|s| s.cell.kind == kind);
+        let solved = || sets.iter().flat_map(|s| s.solved()).filter(|s| s.cell.kind() == kind);
         assert_eq!(of_kind.samples, solved().count());
         assert_eq!(of_kind.train_rows + of_kind.validation_rows, of_kind.samples);
         assert!(of_kind.losses[of_kind.best_epoch - 1].train < of_kind.losses[0].train);
@@ -560,8 +561,8 @@ fn one_network_learns_from_several_vehicles_reproducibly() {
         let mut errors = Vec::new();
         for set in &sets {
             let vehicle = &set.metadata.vehicle;
-            assert!(!fleet.manoeuvres(kind, vehicle).is_empty());
-            for s in set.solved().filter(|s| s.cell.kind == kind) {
+            assert!(!fleet.manoeuvres(Stance::new(kind, 0.0), vehicle).is_empty());
+            for s in set.solved().filter(|s| s.cell.kind() == kind) {
                 let mut poses = Vec::new();
                 fleet.select(&Features::new(s.start, s.cell), vehicle, 2, &mut poses);
                 assert_eq!(poses.len(), 1);

@@ -23,15 +23,17 @@ use std::path::Path;
 /// Whether a Reeds-Shepp curve, with a straight into the spot, leads from `pose` to the
 /// goal of `cell` without contact: written here from the definition.
 fn has_free_connection(grid: &Grid, cell: &Cell, vehicle: &Vehicle, pose: Pose) -> bool {
-    let goal = grid.goal(cell.kind, vehicle);
+    let goal = grid.goal(cell.stance, vehicle);
     let world = CollisionWorld::new(&grid.walls(cell).unwrap(), None, vehicle, 0.0);
     if !world.pose_is_free(pose) {
         return false;
     }
-    let gears: &[Gear] = match cell.kind {
+    let gears: &[Gear] = match cell.kind() {
         ParkingType::Forward => &[Gear::Forward],
         ParkingType::Reverse => &[Gear::Backward],
         ParkingType::Parallel => &[Gear::Forward, Gear::Backward],
+        ParkingType::Angled if goal.heading < 0.0 => &[Gear::Forward],
+        ParkingType::Angled => &[Gear::Backward],
     };
     let straights = gears.iter().flat_map(|g| (0..=100).map(|i| g.sign() * 0.05 * f64::from(i)));
     let mut out: Vec<Word> = Vec::new();
@@ -50,17 +52,17 @@ fn every_pose_the_knn_selects_has_a_free_curve_in_the_scenes_own_cell() {
     let model = Model::load(Path::new("models/knn.bin")).unwrap();
     let vehicle = *model.vehicle().unwrap();
     let selector = model.into_selector();
-    let grid = *selector.grid();
+    let grid = *selector.grid(ParkingType::Reverse);
     let (mut asked, mut answered) = (0, 0);
     let mut poses = Vec::new();
-    for kind in ParkingType::ALL {
+    for kind in ParkingType::SQUARE {
         for level in Level::ALL {
             for i in 0..100 {
                 let scene = generate(&GeneratorConfig::default(), &vehicle, kind, level, 4242, i);
                 let problem = Problem::new(&scene).unwrap();
-                for found in abstractions(&problem.obstacles, kind, &grid) {
+                for found in abstractions(&problem.obstacles, problem.stance().unwrap(), &grid) {
                     asked += 1;
-                    let start = Pose { y: problem.start.y - found.shift, ..problem.start };
+                    let start = found.in_cell(problem.start);
                     poses.clear();
                     selector.select(&Features::new(start, found.cell), &vehicle, 1, &mut poses);
                     for &pose in &poses {
@@ -85,7 +87,7 @@ fn no_method_fails_on_900_scenes() {
     let models = Models::load(&["models/knn.bin"]).unwrap();
     let scenes = suite::generated(
         &models.vehicle().expect("the model knows its vehicle"),
-        &ParkingType::ALL,
+        &ParkingType::SQUARE,
         &Level::ALL,
         100,
         900_900,

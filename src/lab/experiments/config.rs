@@ -157,7 +157,7 @@ impl EvaluateConfig {
 }
 
 fn all_types() -> Vec<ParkingType> {
-    ParkingType::ALL.to_vec()
+    ParkingType::SQUARE.to_vec()
 }
 
 fn all_levels() -> Vec<Level> {

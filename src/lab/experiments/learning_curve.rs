@@ -24,7 +24,7 @@ pub(super) fn points(
     let part = subset.of(data);
     let kinds = &config.evaluate.types;
     let knn = folder.join("knn.bin");
-    training::knn::train(&part.metadata, &part.samples, kinds, &knn)?;
+    training::knn::train(&part.metadata, &part.samples, kinds, u32::MAX, &knn)?;
     let mut files = vec![knn];
     if curve.needs_mlp() {
         for &kind in kinds {
@@ -46,7 +46,7 @@ pub(super) fn points(
     bar.finish_and_clear();
     let mut points = Vec::new();
     for &kind in kinds {
-        let solved = part.solved().filter(|s| s.cell.kind == kind).count();
+        let solved = part.solved().filter(|s| s.cell.kind() == kind).count();
         let from = Part {
             grid: &part.metadata.grid,
             samples_per_cell: part.metadata.samples_per_cell,

@@ -295,7 +295,7 @@ impl Runner<'_> {
         let knn_settings = settings(("knn", data));
         if self.stages.begin("train-knn", &knn_settings, knn.exists())? != Todo::Nothing {
             let set = self.dataset(read)?;
-            training::knn::train(&set.metadata, &set.samples, kinds, &knn)?;
+            training::knn::train(&set.metadata, &set.samples, kinds, u32::MAX, &knn)?;
             self.stages.finish("train-knn", &knn_settings)?;
         }
         if !self.config.needs_mlp() {

@@ -69,12 +69,12 @@ pub struct FleetKindLog {
 pub fn train(sets: &[Dataset], config: &MlpConfig, out: &Path) -> Result<FleetLog, TrainingError> {
     config.validate()?;
     let mut solved = Vec::new();
-    for kind in ParkingType::ALL {
+    for kind in ParkingType::SQUARE {
         solved.push((kind, solved_of(sets, kind)?));
     }
     let condensed: Vec<UnitManoeuvres> = std::thread::scope(|scope| {
-        let condense = |(kind, of_sets)| scope.spawn(move || manoeuvres(sets, kind, of_sets));
-        let running: Vec<_> = solved.iter().map(|(k, of_sets)| condense((*k, of_sets))).collect();
+        let condense = |of_sets| scope.spawn(move || manoeuvres(sets, of_sets));
+        let running: Vec<_> = solved.iter().map(|(_, of_sets)| condense(of_sets)).collect();
         running.into_iter().map(|r| r.join().expect("condensing does not panic")).collect()
     });
     let (mut scaling, mut networks, mut logs) = (Vec::new(), Vec::new(), Vec::new());
@@ -85,11 +85,11 @@ pub fn train(sets: &[Dataset], config: &MlpConfig, out: &Path) -> Result<FleetLo
         logs.push(learnt.log);
     }
     let count = |m: &UnitManoeuvres| m.iter().map(Vec::len).sum();
-    let kinds = ParkingType::ALL.into_iter().zip(&condensed);
+    let kinds = ParkingType::SQUARE.into_iter().zip(&condensed);
     let header = FleetHeader {
         format_version: fleet::VERSION,
         fleet: sets.iter().map(|s| s.metadata.vehicle).collect(),
-        data_sha256: sets.iter().map(|s| s.content_sha256(&ParkingType::ALL)).collect(),
+        data_sha256: sets.iter().map(|s| s.content_sha256(&ParkingType::SQUARE)).collect(),
         kinds: kinds.map(|(kind, m)| (kind, m.len(), count(m))).collect(),
         grid: sets[0].metadata.grid,
         features: UNIT_NAMES.map(str::to_owned).to_vec(),
@@ -126,12 +126,12 @@ fn solved_of(sets: &[Dataset], kind: ParkingType) -> Result<Vec<Vec<&Sample>>, T
 }
 
 /// The manoeuvres that serve all samples.
-fn manoeuvres(sets: &[Dataset], kind: ParkingType, solved: &[Vec<&Sample>]) -> UnitManoeuvres {
+fn manoeuvres(sets: &[Dataset], solved: &[Vec<&Sample>]) -> UnitManoeuvres {
     let sources = sets.iter().zip(solved).map(|(set, solved)| {
         let unit = set.metadata.vehicle.turning_radius();
         Source { metadata: &set.metadata, solved, unit }
     });
-    condense(kind, &sources.collect::<Vec<_>>())
+    condense(&sources.collect::<Vec<_>>())
 }
 
 /// A network and how it was learnt.

@@ -8,11 +8,12 @@ pub use super::leave_one_out::LeaveOneOut;
 use super::leave_one_out::leave_one_out;
 use super::library::{self, Source};
 use super::{TrainingError, card, solved, write_beside};
+use crate::curves::Segment;
 use crate::geometry::Pose;
 use crate::lab::dataset::{Metadata, Sample, content_sha256};
 use crate::selectors::artefact;
 use crate::selectors::knn_file::{self, KindHeader, KnnEntries, KnnEntry, KnnHeader};
-use crate::world::ParkingType;
+use crate::world::{ParkingType, Stance};
 
 /// What was stored; written as JSON beside the model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,7 +37,7 @@ pub struct KnnKindLog {
     pub kind: ParkingType,
     /// Rows of the data set.
     pub rows: usize,
-    /// Rows stored: the solved ones.
+    /// Rows stored: solved ones.
     pub samples: usize,
     /// Cells of the grid.
     pub cells: usize,
@@ -48,8 +49,8 @@ pub struct KnnKindLog {
     pub leave_one_out: Option<LeaveOneOut>,
 }
 
-/// Stores the solved samples of `kinds`, and the manoeuvres that serve them, in the file `out`,
-/// with its log and its model card beside it.
+/// Stores the solved samples of `kinds`, the first `samples_per_cell` of each cell, and the manoeuvres
+/// that serve them all, in the file `out`, with its log and its model card beside it.
 ///
 /// A parking type without a solved sample is an error: a selector that knows nothing of it
 /// would be found out only on the road.
@@ -57,6 +58,7 @@ pub fn train(
     metadata: &Metadata,
     samples: &[Sample],
     kinds: &[ParkingType],
+    samples_per_cell: u32,
     out: &Path,
 ) -> Result<KnnLog, TrainingError> {
     let mut known = Vec::new();
@@ -69,40 +71,50 @@ pub fn train(
     }
     let heading_radius = metadata.vehicle.turning_radius() / 2.0;
     let learnt: Vec<_> = std::thread::scope(|scope| {
-        let learn = |(kind, solved): &(ParkingType, Vec<&Sample>)| {
-            let manoeuvres = library::condense(*kind, &[Source { metadata, solved, unit: 1.0 }]);
-            (manoeuvres, leave_one_out(metadata, solved, heading_radius))
+        let learn = |kind: ParkingType, solved| {
+            move || {
+                let stored = stored(solved, samples_per_cell);
+                let leave_one_out = leave_one_out(metadata, &stored, heading_radius);
+                (by_stance(metadata, kind, solved), stored, leave_one_out)
+            }
         };
-        let running: Vec<_> = known.iter().map(|k| scope.spawn(move || learn(k))).collect();
+        let running: Vec<_> = known.iter().map(|(k, s)| scope.spawn(learn(*k, &s[..]))).collect();
         running.into_iter().map(|r| r.join().expect("learning does not panic")).collect()
     });
     let mut headers = Vec::new();
     let mut entries = Vec::new();
     let mut logs = Vec::new();
-    for ((kind, solved), (manoeuvres, leave_one_out)) in known.into_iter().zip(learnt) {
+    for ((kind, _), (by_stance, stored, leave_one_out)) in known.iter().zip(learnt) {
+        let kind = *kind;
         let cells = metadata.grid.cell_count(kind);
         let entry =
             |s: &&Sample| KnnEntry { cell: s.cell_index, start: s.start, preparatory: s.rs_start };
-        let collected = KnnEntries { samples: solved.iter().map(entry).collect(), manoeuvres };
+        let manoeuvres_by_stance = match &by_stance[..] {
+            [_] => Vec::new(),
+            several => several.iter().map(Vec::len).collect(),
+        };
+        let manoeuvres = by_stance.concat();
+        let collected = KnnEntries { samples: stored.iter().map(entry).collect(), manoeuvres };
         logs.push(KnnKindLog {
             kind,
-            rows: samples.iter().filter(|s| s.cell.kind == kind).count(),
-            samples: solved.len(),
+            rows: samples.iter().filter(|s| s.cell.kind() == kind).count(),
+            samples: stored.len(),
             cells,
-            occupied_cells: solved.chunk_by(|a, b| a.cell_index == b.cell_index).count(),
+            occupied_cells: stored.chunk_by(|a, b| a.cell_index == b.cell_index).count(),
             manoeuvres: collected.manoeuvres.len(),
             leave_one_out,
         });
         headers.push(KindHeader {
             kind,
             cells,
-            samples: solved.len(),
+            samples: stored.len(),
             manoeuvres: collected.manoeuvres.len(),
             segments: collected.manoeuvres.iter().map(Vec::len).sum(),
+            manoeuvres_by_stance,
         });
         entries.push(collected);
     }
-    let of_kinds = samples.iter().filter(|s| kinds.contains(&s.cell.kind));
+    let of_kinds = samples.iter().filter(|s| kinds.contains(&s.cell.kind()));
     let header = KnnHeader {
         vehicle: metadata.vehicle,
         grid: metadata.grid,
@@ -119,6 +131,23 @@ pub fn train(
     let log = KnnLog { data_sha256, seed, heading_radius, bytes: bytes.len(), kinds: logs };
     write_beside(out, &log, card::knn(out, metadata, &log))?;
     Ok(log)
+}
+
+/// The manoeuvres for each of the grid's stances.
+fn by_stance(metadata: &Metadata, kind: ParkingType, solved: &[&Sample]) -> Vec<Vec<Vec<Segment>>> {
+    let of_stance = |stance: Stance| {
+        let own = solved.iter().copied().filter(|s| s.cell.stance == stance);
+        let solved = &own.collect::<Vec<_>>()[..];
+        library::condense(&[Source { metadata, solved, unit: 1.0 }])
+    };
+    metadata.grid.stances(kind).into_iter().map(of_stance).collect()
+}
+
+/// The first `samples_per_cell` samples of each cell.
+fn stored<'a>(solved: &[&'a Sample], samples_per_cell: u32) -> Vec<&'a Sample> {
+    let most = usize::try_from(samples_per_cell).unwrap_or(usize::MAX);
+    let cells = solved.chunk_by(|a, b| a.cell_index == b.cell_index);
+    cells.flat_map(|cell| &cell[..most.min(cell.len())]).copied().collect()
 }
 
 /// The least power of two, from 16 m, that no coordinate exceeds.

@@ -6,12 +6,13 @@ use crate::planners::cost::CostModel;
 use crate::planners::hybrid_astar::{GoalSet, Leg};
 use crate::planners::library::{Library, LibraryPlan};
 use crate::planners::{Guidance, Problem, Route};
-use crate::world::ParkingType;
 use crate::world::abstraction::abstractions;
 use crate::world::cell::Grid;
+use crate::world::{ParkingType, Stance};
 
-/// Libraries kept prepared: those of the parking types of two vehicles, or of one with two margins.
-const LIBRARIES: usize = 6;
+/// Libraries kept prepared: those of the parking types of two vehicles, or of one with two margins,
+/// and of some slants.
+const LIBRARIES: usize = 12;
 /// Known manoeuvres, free in the scene, that `n3p` tries to join before it asks for the curve
 /// straight to the goal, and then once more for something cheaper: most plans take the first.
 const FIRST_TRIES: usize = 16;
@@ -34,9 +35,9 @@ const TRIES: usize = 64;
 /// Those that it tries to join by a long way round, where no other plan was found.
 const LONG_WAYS: usize = 8;
 
-/// A library made ready for a parking type and a footprint.
+/// A library made ready for a way to stand parked and a footprint.
 pub(super) struct Prepared {
-    kind: ParkingType,
+    stance: Stance,
     library: Library,
     /// From this number on its manoeuvres are none but the straight into the spot, or nothing at
     /// all: what joins them is the curve straight to the goal.
@@ -136,13 +137,13 @@ impl GuidedPlanner {
 
     /// Puts the library for `problem` first, prepared if need be, and says whether there is one.
     pub(super) fn prepare_library(&mut self, problem: &Problem) -> bool {
-        let Some(kind) = problem.kind else { return false };
-        let fits = |p: &Prepared| p.kind == kind && p.library.fits(problem);
+        let Some(stance) = problem.stance() else { return false };
+        let fits = |p: &Prepared| p.stance == stance && p.library.fits(problem);
         match self.libraries.iter().position(fits) {
             Some(at) => self.libraries[..=at].rotate_right(1),
             None => {
                 let (vehicle, footprint) = (&problem.vehicle, *problem.collision.footprint());
-                let manoeuvres = self.selector.manoeuvres(kind, vehicle);
+                let manoeuvres = self.selector.manoeuvres(stance, vehicle);
                 let cost = self.hars.cost(vehicle);
                 let mut library = Library::new(&manoeuvres, vehicle, footprint, &cost);
                 let straights = library.len();
@@ -150,7 +151,7 @@ impl GuidedPlanner {
                     library.add(entry, &cost);
                 }
                 self.libraries.truncate(LIBRARIES - 1);
-                self.libraries.insert(0, Prepared { kind, library, straights });
+                self.libraries.insert(0, Prepared { stance, library, straights });
             }
         }
         self.libraries[0].straights > 0
@@ -180,10 +181,10 @@ impl GuidedPlanner {
     /// vehicles of any.
     pub(super) fn is_unusual(&self, problem: &Problem) -> bool {
         let scale = problem.vehicle.scale();
-        problem.kind.is_some_and(|kind| {
+        problem.stance().is_some_and(|stance| {
             let grid = || Grid::default().scaled(scale);
             problem.mouth > DEEPER * scale
-                || abstractions(&problem.obstacles, kind, &grid()).is_empty()
+                || abstractions(&problem.obstacles, stance, &grid()).is_empty()
         })
     }
 

@@ -136,6 +136,7 @@ fn spots(kind: ParkingType) -> &'static str {
         ParkingType::Forward => "forward bays (nose in)",
         ParkingType::Reverse => "reverse bays (tail in)",
         ParkingType::Parallel => "parallel spots",
+        ParkingType::Angled => "angled bays (30° to 150°, nose in or tail in)",
     }
 }
 
