@@ -49,13 +49,23 @@ fn has_free_connection(grid: &Grid, cell: &Cell, vehicle: &Vehicle, pose: Pose) 
 
 #[test]
 fn every_pose_the_knn_selects_has_a_free_curve_in_the_scenes_own_cell() {
-    let model = Model::load(Path::new("models/knn.bin")).unwrap();
+    let least = [("models/knn.bin", &ParkingType::SQUARE[..], 900)];
+    let angled = [("models/knn-angled.bin", &[ParkingType::Angled][..], 300)];
+    for (file, kinds, least) in least.into_iter().chain(angled) {
+        let (asked, answered) = answers_of(file, kinds);
+        assert!(answered > least && answered * 10 > asked * 9, "{file}: {answered} of {asked}");
+    }
+}
+
+/// How often a model is asked for a pose in generated scenes, and how often it answers.
+fn answers_of(file: &str, kinds: &[ParkingType]) -> (u32, u32) {
+    let model = Model::load(Path::new(file)).unwrap();
     let vehicle = *model.vehicle().unwrap();
     let selector = model.into_selector();
-    let grid = *selector.grid(ParkingType::Reverse);
+    let grid = *selector.grid(kinds[0]);
     let (mut asked, mut answered) = (0, 0);
     let mut poses = Vec::new();
-    for kind in ParkingType::SQUARE {
+    for &kind in kinds {
         for level in Level::ALL {
             for i in 0..100 {
                 let scene = generate(&GeneratorConfig::default(), &vehicle, kind, level, 4242, i);
@@ -77,7 +87,31 @@ fn every_pose_the_knn_selects_has_a_free_curve_in_the_scenes_own_cell() {
             }
         }
     }
-    assert!(answered > 900 && answered * 10 > asked * 9, "{answered} of {asked}");
+    (asked, answered)
+}
+
+/// Angled bays are planned mostly with known manoeuvres, whether a scene says so or not.
+#[test]
+fn angled_bays_are_planned_without_a_search() {
+    let models = Models::load(&["models/knn.bin", "models/knn-angled.bin"]).unwrap();
+    let vehicle = models.vehicle().unwrap();
+    let kinds = [ParkingType::Angled];
+    let cases = suite::generated(&vehicle, &kinds, &Level::ALL, 40, 515).unwrap();
+    let mut planner = Method::N3P.build(&models, &MethodSettings::default()).unwrap();
+    for hinted in [true, false] {
+        let mut without = 0;
+        for case in &cases {
+            let parking_type = case.scene.parking_type.filter(|_| hinted);
+            let scene = Scene { parking_type, ..case.scene.clone() };
+            let problem = Problem::new(&scene).unwrap();
+            let result = planner.plan(&problem, Budget::new(200_000));
+            let path = result.outcome.unwrap_or_else(|e| panic!("{}: {e}", scene.name));
+            let file = PathFile::new(&scene, &problem.frame, &path, "n3p");
+            oracle::check(&scene, &file).unwrap_or_else(|e| panic!("{}: {e}", scene.name));
+            without += usize::from(result.expansions == 0);
+        }
+        assert!(without * 10 > cases.len() * 8, "{without} of {}", cases.len());
+    }
 }
 
 /// Every method that has a model or needs none, on 100 scenes of each type and level: a

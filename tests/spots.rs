@@ -3,11 +3,12 @@
 
 #![cfg(feature = "lab")]
 
-use n3p::geometry::{Frame, Pose, Vec2};
+use n3p::geometry::{Frame, Pose, Vec2, signed_angle};
 use n3p::vehicle::Vehicle;
 use n3p::world::bays::{Unusual, bay};
+use n3p::world::generate::{GeneratorConfig, generate};
 use n3p::world::spot::{Precision, guess};
-use n3p::world::{ParkingType, Scene};
+use n3p::world::{Level, ParkingType, Scene, Stance};
 
 const SEED: u64 = 5;
 const COUNT: u64 = 60;
@@ -128,6 +129,30 @@ fn oblique_bays_are_angled() {
         }
     }
     assert!(!failed, "see above");
+}
+
+/// So are those of the generator, where the car comes along the lane.
+#[test]
+fn generated_angled_bays_are_found_without_a_hint() {
+    let (config, vehicle, kind) =
+        (GeneratorConfig::default(), Vehicle::default(), ParkingType::Angled);
+    for level in Level::ALL {
+        let mut right = 0;
+        for index in 0..COUNT {
+            let scene = generate(&config, &vehicle, kind, level, SEED, index);
+            let [given, found] = [&scene, &without_type(&scene)]
+                .map(|scene| guess(scene, Precision::Rounded).unwrap().stance);
+            assert_eq!(given.map(Stance::kind), Some(kind), "{}", scene.name);
+            let apart = |s: Stance| signed_angle(scene.goal.heading, s.heading()).abs();
+            let is_right = |s: Stance| s.kind() == kind && apart(s) < 8_f64.to_radians();
+            right += u64::from(found.is_some_and(is_right));
+            if !found.is_some_and(is_right) {
+                println!("{}: {:?} for {}", scene.name, found, scene.goal.heading);
+            }
+        }
+        println!("{level}: {right} of {COUNT}");
+        assert!(100 * right >= 85 * COUNT, "{level}: {right} of {COUNT}");
+    }
 }
 
 #[test]

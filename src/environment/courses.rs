@@ -26,7 +26,7 @@ pub enum Course {
 /// A kind of problems of their own difficulty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Stratum {
-    /// The parking type.
+    /// The parking type, one of the paper's: no course has angled bays.
     pub kind: ParkingType,
     /// The level: of generated scenes, or of the sizes that cells are drawn with.
     pub level: Level,

@@ -158,14 +158,19 @@ impl Surroundings {
         self.polygons.last().map_or(0, |p| p.end)
     }
 
-    /// How far from `from` along the unit vector `along` the first obstacle is within `width` of that
-    /// ray on either side, at most `most`. A ray without width would pass between scanned points.
-    pub fn free_along(&self, from: Vec2, along: Vec2, width: f64, most: f64) -> f64 {
+    /// Whether some obstacle is within `most` of `from` along the unit vector `along`, and within `width`
+    /// of that ray on either side. A ray without width would pass between scanned points.
+    pub fn ends_within(&self, most: f64, from: Vec2, along: Vec2, width: f64) -> bool {
+        self.ahead(from, along, width).any(|free| free <= most)
+    }
+
+    /// How far along a ray every edge is that it meets.
+    fn ahead(&self, from: Vec2, along: Vec2, width: f64) -> impl Iterator<Item = f64> {
         let across = Vec2::new(-along.y, along.x);
-        let seen = |p: Vec2| Vec2::new((p - from).dot(&along), (p - from).dot(&across));
-        let within = |&(a, b): &(Vec2, Vec2)| clip(seen(a), seen(b), 1, -width, width);
+        let seen = move |p: Vec2| Vec2::new((p - from).dot(&along), (p - from).dot(&across));
+        let within = move |&(a, b): &(Vec2, Vec2)| clip(seen(a), seen(b), 1, -width, width);
         let ahead = self.edges.iter().filter_map(within).filter(|(a, b)| a.x.max(b.x) >= 0.0);
-        ahead.fold(most, |free, (a, b)| free.min(a.x.min(b.x).max(0.0)))
+        ahead.map(|(a, b)| a.x.min(b.x).max(0.0))
     }
 
     /// How far from x = `from` nothing stands between `low` and `high` in y, toward the side where
@@ -212,15 +217,13 @@ impl Surroundings {
         let near = Near::new(self, stance, grid);
         let low = near.bottom_shift();
         let most = USUAL_SHIFT * grid.bay_depth;
-        for shift in [low, self.protrusion(stance, grid).max(low)] {
-            if shift <= most {
-                let found = near.at_shift(shift);
-                if !found.is_empty() {
-                    return found;
-                }
-            }
+        let at = |shift: f64| if shift <= most { near.at_shift(shift) } else { Vec::new() };
+        let found = at(low);
+        if !found.is_empty() {
+            return found;
         }
-        Vec::new()
+        let protrusion = self.protrusion(stance, grid);
+        if protrusion > low { at(protrusion) } else { found }
     }
 
     /// The lanes that begin as little farther out as there is one, largest first.

@@ -66,10 +66,11 @@ impl Axis {
         self.min + index as f64 * self.step
     }
 
-    /// All values, the smallest first.
-    pub fn values(&self) -> impl Iterator<Item = f64> + use<> {
-        let axis = *self;
-        (0..axis.len()).map(move |i| axis.value(i))
+    /// Index of the value that is `v`, give or take a rounding.
+    fn index_of(&self, v: f64) -> Option<usize> {
+        const ROUNDING: f64 = 1e-6;
+        let nearest = self.floor(v + self.step / 2.0)?;
+        ((self.value(nearest) - v).abs() < ROUNDING).then_some(nearest)
     }
 
     /// Index of the largest value ≤ `v`; `None` below the smallest.
@@ -177,7 +178,7 @@ impl Grid {
         }
         self.slant_deg.validate("slant_deg")?;
         let (min, max) = (self.slant_deg.min, self.slant_deg.max);
-        if min < 15.0 || max > 165.0 || self.slants().next().is_none() {
+        if min < 15.0 || max > 165.0 || self.stance_count(ParkingType::Angled) == 0 {
             return Err(GridError {
                 field: "slant_deg".to_owned(),
                 value: format!("min {min}, max {max}, step {}", self.slant_deg.step),
@@ -218,21 +219,48 @@ impl Grid {
         if kind.is_bay() { self.bay_depth } else { self.parallel_depth }
     }
 
-    /// Slants of angled bays, radians.
-    fn slants(&self) -> impl Iterator<Item = f64> + use<> {
-        self.slant_deg.values().filter(|v| (v - 90.0).abs() > 1e-6).map(f64::to_radians)
-    }
-
     /// How cars of a type may stand parked: tail in and nose in at each of the slants of angled bays,
     /// one way only otherwise.
     pub fn stances(&self, kind: ParkingType) -> Vec<Stance> {
-        match kind.goal_heading() {
-            Some(heading) => vec![Stance::new(kind, heading)],
-            None => {
-                let both = |slant| [slant, slant - PI].map(|heading| Stance::new(kind, heading));
-                self.slants().flat_map(both).collect()
+        (0..self.stance_count(kind)).map(|i| self.stance(kind, i)).collect()
+    }
+
+    fn stance_count(&self, kind: ParkingType) -> usize {
+        match kind {
+            ParkingType::Angled => {
+                2 * (self.slant_deg.len() - usize::from(self.square_slant().is_some()))
             }
+            _ => 1,
         }
+    }
+
+    /// The stance with `index` in `0..stance_count`.
+    fn stance(&self, kind: ParkingType, index: usize) -> Stance {
+        let slant = index / 2;
+        let skipped = usize::from(self.square_slant().is_some_and(|square| slant >= square));
+        let heading = self.slant_deg.value(slant + skipped).to_radians();
+        Stance::new(kind, if index % 2 == 0 { heading } else { heading - PI })
+    }
+
+    /// The index of a stance that is one of the grid's; undoes [`Grid::stance`].
+    fn stance_index(&self, stance: Stance) -> Option<usize> {
+        if stance.kind() != ParkingType::Angled {
+            return Some(0);
+        }
+        let nose_in = stance.heading() < 0.0;
+        let slant = if nose_in { stance.heading() + PI } else { stance.heading() }.to_degrees();
+        let index = self.slant_deg.index_of(slant)?;
+        let square = self.square_slant();
+        if square == Some(index) {
+            return None;
+        }
+        let skipped = usize::from(square.is_some_and(|square| index > square));
+        Some(2 * (index - skipped) + usize::from(nose_in))
+    }
+
+    /// Which of the slants is square, and left out.
+    fn square_slant(&self) -> Option<usize> {
+        self.slant_deg.index_of(90.0)
     }
 
     /// y of the boundary between spot and lane, metres: of a slanted bay that of its farthest corner
@@ -260,15 +288,11 @@ impl Grid {
         self.stance_count(kind) * of_stance
     }
 
-    fn stance_count(&self, kind: ParkingType) -> usize {
-        if kind == ParkingType::Angled { 2 * self.slants().count() } else { 1 }
-    }
-
     /// The cell with `index` in `0..cell_count`: dead end fastest, then spot, then lane, then stance.
     pub fn cell(&self, kind: ParkingType, index: usize) -> Cell {
         let [stance, lane, spot, dead_end] = self.place(kind, index);
         Cell {
-            stance: self.stances(kind)[stance],
+            stance: self.stance(kind, stance),
             lane_width: self.lane_width.value(lane),
             spot_width: self.spot_width(kind).value(spot),
             dead_end: self.dead_end.value(dead_end),
@@ -293,11 +317,7 @@ impl Grid {
     /// below the grid, or the car stands at a slant that is none of the grid's.
     pub fn floor(&self, cell: &Cell) -> Option<usize> {
         let kind = cell.kind();
-        let same = |s: &Stance| (s.heading() - cell.stance.heading()).abs() < 1e-9;
-        let stance = match kind {
-            ParkingType::Angled => self.stances(kind).iter().position(same)?,
-            _ => 0,
-        };
+        let stance = self.stance_index(cell.stance)?;
         let lane = self.lane_width.floor(cell.lane_width)?;
         let spot = self.spot_width(kind).floor(cell.spot_width)?;
         let dead_end = self.dead_end.floor(cell.dead_end)?;

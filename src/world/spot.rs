@@ -14,7 +14,7 @@
 //! with the scene leaves only its two directions to choose from.
 //!
 //! What looks like a lane may be no more than the room before slanted bays. It is one where no oblique
-//! direction leads farther than along it. Where so no other type fits, an angled bay is looked for
+//! direction leads farther than along it. Where so no usual spot fits, an angled bay is looked for
 //! (`angled`).
 
 use super::abstraction::{Abstraction, Surroundings, abstractions};
@@ -90,7 +90,7 @@ impl SpotGuess {
 /// The planning frame of a scene.
 pub fn guess(scene: &Scene, precision: Precision) -> Result<SpotGuess, ObstacleError> {
     let seen = |frame, stance, mouth| seen(scene, frame, stance, mouth, precision);
-    let as_found = |Found { frame, stance, mouth }| seen(frame, Some(stance), mouth);
+    let as_found = |Found { frame, stance, mouth, .. }| seen(frame, Some(stance), mouth);
     let kind = match scene.parking_type {
         None => {
             return found(scene, &ParkingType::ALL, precision)
@@ -161,6 +161,8 @@ struct Found {
     stance: Stance,
     /// See [`SpotGuess`].
     mouth: f64,
+    /// Area of the lane's cell.
+    size: f64,
 }
 
 /// How little may do for a spot beside a lane.
@@ -175,16 +177,25 @@ enum Demand {
 }
 
 /// The likeliest spot of one of `kinds`: the car stands in its lane rather than elsewhere, and the
-/// lane is large. Where there is a usual one, others do not count; where one is square to its lane or
-/// along it, angled ones do not.
+/// lane is large. Where there is a usual one, others do not count. An angled one counts where none is
+/// usual, and any other's lane is clearly smaller.
 fn found(scene: &Scene, kinds: &[ParkingType], precision: Precision) -> Option<Found> {
     let near = around_goal(scene, precision);
     let (angled, square): (Vec<_>, Vec<_>) = kinds.iter().partition(|k| **k == ParkingType::Angled);
-    let found = [Demand::Usual, Demand::FartherOut, Demand::Least]
-        .into_iter()
-        .find_map(|demand| likeliest(scene, &near, &square, demand));
-    found.or_else(|| angled.first().and_then(|_| angled::found(scene, &near)))
+    let likeliest = |demand| likeliest(scene, &near, &square, demand);
+    if let Some(usual) = likeliest(Demand::Usual) {
+        return Some(usual);
+    }
+    let square = likeliest(Demand::FartherOut).or_else(|| likeliest(Demand::Least));
+    let angled = angled.first().and_then(|_| angled::found(scene, &near));
+    match (square, angled) {
+        (Some(square), Some(angled)) if angled.size > CLEARLY * square.size => Some(angled),
+        (square, angled) => square.or(angled),
+    }
 }
+
+/// An angled bay's lane must be so many times as large as that of an unusual square spot to count.
+const CLEARLY: f64 = 1.25;
 
 fn likeliest(
     scene: &Scene,
@@ -202,7 +213,8 @@ fn likeliest(
             let lane = widest(&seen, stance, &grid, demand)?;
             let merit = merit(&lane, &grid, frame.local_from_world(scene.start));
             let is_lane = is_along(&seen, &lane, &grid, scene.vehicle.scale());
-            is_lane.then_some((merit, Found { frame, stance, mouth: lane.shift }))
+            let (_, size) = merit;
+            is_lane.then_some((merit, Found { frame, stance, mouth: lane.shift, size }))
         })
     };
     let mut best: Option<((bool, f64), Found)> = None;
@@ -245,19 +257,19 @@ fn is_along(seen: &Surroundings, lane: &Abstraction, grid: &Grid, scale: f64) ->
     if along >= endless {
         return true;
     }
+    let enough = along * SLACK;
+    if enough >= endless {
+        return true;
+    }
     let middle = Vec2::new(beside, f64::midpoint(area.min.y, area.max.y));
-    let free = |turn: f64, side: f64| {
+    let ends = |turn: f64, side: f64| {
         let (sin, cos) = turn.to_radians().sin_cos();
-        seen.free_along(middle, Vec2::new(cos * side, sin), RAY * scale, endless)
+        seen.ends_within(enough, middle, Vec2::new(cos * side, sin), RAY * scale)
     };
     // Both ways: what a gap lets see is seen on one side only.
-    let across = |side| move |turn: &f64| free(*turn, side).min(free(-turn, -side));
+    let ends_across = |side| move |turn: &f64| ends(*turn, side) || ends(-turn, -side);
     let oblique = [30.0, 37.5, 45.0, 52.5, 60.0];
-    let farthest = [1.0, -1.0]
-        .into_iter()
-        .flat_map(|side| oblique.iter().map(across(side)))
-        .fold(0.0, f64::max);
-    farthest <= along * SLACK
+    [1.0, -1.0].into_iter().all(|side| oblique.iter().all(ends_across(side)))
 }
 
 /// Obstacles within this of the parked centre are looked at, metres for the default vehicle: more

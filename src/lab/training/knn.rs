@@ -39,6 +39,9 @@ pub struct KnnKindLog {
     pub rows: usize,
     /// Rows stored: solved ones.
     pub samples: usize,
+    /// Rows solved, where not all of them are stored.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub solved: Option<usize>,
     /// Cells of the grid.
     pub cells: usize,
     /// Cells that have a sample.
@@ -84,7 +87,7 @@ pub fn train(
     let mut headers = Vec::new();
     let mut entries = Vec::new();
     let mut logs = Vec::new();
-    for ((kind, _), (by_stance, stored, leave_one_out)) in known.iter().zip(learnt) {
+    for ((kind, solved), (by_stance, stored, leave_one_out)) in known.iter().zip(learnt) {
         let kind = *kind;
         let cells = metadata.grid.cell_count(kind);
         let entry =
@@ -99,6 +102,7 @@ pub fn train(
             kind,
             rows: samples.iter().filter(|s| s.cell.kind() == kind).count(),
             samples: stored.len(),
+            solved: (stored.len() < solved.len()).then_some(solved.len()),
             cells,
             occupied_cells: stored.chunk_by(|a, b| a.cell_index == b.cell_index).count(),
             manoeuvres: collected.manoeuvres.len(),
