@@ -239,7 +239,7 @@ impl Grid {
         let slant = index / 2;
         let skipped = usize::from(self.square_slant().is_some_and(|square| slant >= square));
         let heading = self.slant_deg.value(slant + skipped).to_radians();
-        Stance::new(kind, if index % 2 == 0 { heading } else { heading - PI })
+        Stance::new(kind, if index.is_multiple_of(2) { heading } else { heading - PI })
     }
 
     /// The index of a stance that is one of the grid's; undoes [`Grid::stance`].
