@@ -11,7 +11,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use n3p::curves::{Path, Segment};
-use n3p::geometry::{Pose};
+use n3p::geometry::Pose;
 use n3p::output::drawing::{Drawing, scene_svg};
 use n3p::vehicle::Vehicle;
 use n3p::world::cell::{Cell, Grid};
