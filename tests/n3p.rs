@@ -9,7 +9,7 @@ use n3p::lab::evaluation::{oracle, suite};
 use n3p::n3p::guided::RankedConfig;
 use n3p::n3p::{Method, MethodSettings, Models};
 use n3p::output::PathFile;
-use n3p::planners::{Budget, HybridAStarConfig, Problem, Route};
+use n3p::planners::{Budget, Effort, HybridAStarConfig, Problem, Route};
 use n3p::selectors::Features;
 use n3p::selectors::model::Model;
 use n3p::vehicle::{Gear, Vehicle};
@@ -49,11 +49,13 @@ fn has_free_connection(grid: &Grid, cell: &Cell, vehicle: &Vehicle, pose: Pose) 
 
 #[test]
 fn every_pose_the_knn_selects_has_a_free_curve_in_the_scenes_own_cell() {
-    let least = [("models/knn.bin", &ParkingType::SQUARE[..], 900)];
-    let angled = [("models/knn-angled.bin", &[ParkingType::Angled][..], 300)];
-    for (file, kinds, least) in least.into_iter().chain(angled) {
+    let (square, angled) = (&ParkingType::SQUARE[..], &[ParkingType::Angled][..]);
+    for (file, kinds, least, percent) in
+        [("models/knn.bin", square, 900, 90), ("models/knn-angled.bin", angled, 400, 80)]
+    {
         let (asked, answered) = answers_of(file, kinds);
-        assert!(answered > least && answered * 10 > asked * 9, "{file}: {answered} of {asked}");
+        let enough = answered > least && answered * 100 > asked * percent;
+        assert!(enough, "{file}: {answered} of {asked}");
     }
 }
 
@@ -90,7 +92,7 @@ fn answers_of(file: &str, kinds: &[ParkingType]) -> (u32, u32) {
     (asked, answered)
 }
 
-/// Angled bays are planned mostly with known manoeuvres, whether a scene says so or not.
+/// Known manoeuvres lead into nearly all angled bays, whether a scene says that it is one or not.
 #[test]
 fn angled_bays_are_planned_without_a_search() {
     let models = Models::load(&["models/knn.bin", "models/knn-angled.bin"]).unwrap();
@@ -104,13 +106,14 @@ fn angled_bays_are_planned_without_a_search() {
             let parking_type = case.scene.parking_type.filter(|_| hinted);
             let scene = Scene { parking_type, ..case.scene.clone() };
             let problem = Problem::new(&scene).unwrap();
-            let result = planner.plan(&problem, Budget::new(200_000));
+            let budget = Budget { max_expansions: 200_000, effort: Effort::First };
+            let result = planner.plan(&problem, budget);
             let path = result.outcome.unwrap_or_else(|e| panic!("{}: {e}", scene.name));
             let file = PathFile::new(&scene, &problem.frame, &path, "n3p");
             oracle::check(&scene, &file).unwrap_or_else(|e| panic!("{}: {e}", scene.name));
             without += usize::from(result.expansions == 0);
         }
-        assert!(without * 10 > cases.len() * 8, "{without} of {}", cases.len());
+        assert!(without * 10 > cases.len() * 9, "{without} of {}", cases.len());
     }
 }
 

@@ -94,8 +94,9 @@ pub struct KindHeader {
     pub manoeuvres_by_stance: Vec<usize>,
 }
 
-/// Manoeuvres of stances within this of a car's own may serve it, radians: one or two of the usual grid.
-const NEAR_STANCE: f64 = 14.999 * PI / 180.0;
+/// Manoeuvres of stances within this of a car's own may serve it, radians: two or three of the usual
+/// grid.
+const NEAR_STANCE: f64 = 15.001 * PI / 180.0;
 
 impl KindHeader {
     /// Indices of the manoeuvres that may serve a car that stands so.

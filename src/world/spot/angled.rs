@@ -7,7 +7,7 @@
 
 use std::f64::consts::PI;
 
-use super::{Demand, Found, is_along, least_grid, merit, other_way, spot_frame, widest};
+use super::{Demand, Found, grid, is_along, least_grid, merit, other_way, spot_frame, widest};
 use crate::geometry::{Frame, Vec2, signed_angle};
 use crate::world::abstraction::Surroundings;
 use crate::world::cell::{Axis, Grid};
@@ -50,7 +50,10 @@ pub(super) fn found(scene: &Scene, near: &Surroundings) -> Option<Found> {
             let is_lane = is_beside && is_along(&seen, &lane, &full, scene.vehicle.scale());
             let Lane { frame, stance, .. } = best;
             let (_, size) = merit(&lane, &full, frame.local_from_world(scene.start));
-            is_lane.then_some(Found { frame, stance, mouth: lane.shift, size })
+            // A usual bay is wider than the least, and its lane begins farther out.
+            let [usual, least] = [grid(scene), full].map(|grid| grid.lane_boundary(stance));
+            let mouth = (lane.shift - (usual - least) / stance.out().y).max(0.0);
+            is_lane.then_some(Found { frame, stance, mouth, size })
         })
     })
 }
