@@ -20,7 +20,8 @@ fn bench(c: &mut Criterion) {
         group.bench_function(kind.name(), |b| {
             b.iter(|| {
                 let problem = next.next().expect("endless");
-                abstractions(black_box(&problem.obstacles), kind, &grid)
+                let stance = problem.stance().expect("generated scenes have one");
+                abstractions(black_box(&problem.obstacles), stance, &grid)
             });
         });
     }

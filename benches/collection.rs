@@ -19,7 +19,7 @@ fn bench(c: &mut Criterion) {
     let mut group = c.benchmark_group("collection");
     group.sampling_mode(SamplingMode::Flat);
     group.throughput(Throughput::Elements(CELLS as u64 * u64::from(PER_CELL)));
-    for kind in ParkingType::ALL {
+    for kind in ParkingType::SQUARE {
         let count = config.grid.cell_count(kind);
         group.bench_function(kind.name(), |b| {
             b.iter(|| {

@@ -29,7 +29,7 @@ fn closed_problems(kind: ParkingType) -> Vec<Problem> {
 
 fn bench(c: &mut Criterion) {
     let mut group = c.benchmark_group("cost_to_go");
-    for kind in ParkingType::ALL {
+    for kind in ParkingType::SQUARE {
         let problems = closed_problems(kind);
         let mut planner = HybridAStar::new(HybridAStarConfig::default());
         let mut next = problems.iter().cycle();

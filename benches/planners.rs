@@ -25,7 +25,7 @@ fn bench(c: &mut Criterion) {
         };
         let mut group = c.benchmark_group(method.name());
         group.sampling_mode(SamplingMode::Flat).throughput(Throughput::Elements(SCENES));
-        for kind in ParkingType::ALL {
+        for kind in ParkingType::SQUARE {
             for level in Level::ALL {
                 let scene = |i| generate(&config, &vehicle, kind, level, common::SEED, i);
                 let scenes: Vec<_> = (0..SCENES).map(scene).collect();

@@ -14,7 +14,7 @@ use n3p::world::ParkingType;
 
 fn bench(c: &mut Criterion) {
     let problems: Vec<_> =
-        ParkingType::ALL.iter().flat_map(|&kind| common::problems_of(kind, 20)).collect();
+        ParkingType::SQUARE.iter().flat_map(|&kind| common::problems_of(kind, 20)).collect();
     let vehicle = Vehicle::default();
     let selector = |method| {
         let models =
@@ -24,7 +24,7 @@ fn bench(c: &mut Criterion) {
     let (knn, mlp) = (selector(Method::KNN_N3P), selector(Method::MLP_N3P));
     let mut group = c.benchmark_group("selectors");
     for (name, selector, k) in [("knn_1", &knn, 1), ("knn_8", &knn, 8), ("mlp", &mlp, 1)] {
-        let features = common::features(&problems, selector.grid());
+        let features = common::features(&problems, selector.grid(ParkingType::Reverse));
         let mut poses = Vec::new();
         for f in &features {
             selector.select(f, &vehicle, k, &mut poses);

@@ -18,7 +18,7 @@ fn main() -> Result<()> {
     let (dir, vehicle) = (PathBuf::from(dir), Vehicle::default());
     let (count, seed) = (count.parse().context("COUNT")?, seed.parse().context("SEED")?);
     std::fs::create_dir_all(&dir).with_context(|| dir.display().to_string())?;
-    for kind in ParkingType::ALL {
+    for kind in ParkingType::SQUARE {
         for level in Level::ALL {
             for i in 0..count {
                 let scene = generate(&GeneratorConfig::default(), &vehicle, kind, level, seed, i);

@@ -47,7 +47,7 @@ fn main() -> anyhow::Result<()> {
 
     let models = Models::load(&["models/knn.bin"])?;
     let vehicle = models.vehicle().unwrap_or_default();
-    let cases = suite::at_home(&vehicle, &ParkingType::ALL, &Level::ALL, count, seed)?;
+    let cases = suite::at_home(&vehicle, &ParkingType::SQUARE, &Level::ALL, count, seed)?;
     let mut planners = Vec::new();
     for method in METHODS {
         planners.push(method.build(&models, &MethodSettings::default())?);

@@ -21,7 +21,7 @@ fn main() -> anyhow::Result<()> {
     let method: Method = args.first().map_or("n3p", String::as_str).parse()?;
     let (count, repeats) = (number(1, 30)?, number(2, 5)?);
     let kinds =
-        args.get(3).map_or(Ok(ParkingType::ALL.to_vec()), |s| s.parse().map(|k| vec![k]))?;
+        args.get(3).map_or(Ok(ParkingType::SQUARE.to_vec()), |s| s.parse().map(|k| vec![k]))?;
     let levels = args.get(4).map_or(Ok(Level::ALL.to_vec()), |s| s.parse().map(|l| vec![l]))?;
 
     let models = Models::usual(&[method], None)?;

@@ -41,6 +41,8 @@ pub enum Stream {
     Bay = 14,
     /// A whole car park.
     Lot = 15,
+    /// A generated scene of an angled bay.
+    Angled = 16,
     /// A world to learn manoeuvres in.
     World = 20,
 }

@@ -19,7 +19,7 @@ const BUDGET: Budget = Budget::new(200_000);
 
 fn scenes() -> Vec<(ParkingType, Scene)> {
     let (config, vehicle) = (GeneratorConfig::default(), Vehicle::default());
-    let settings = ParkingType::ALL.into_iter().flat_map(|k| Level::ALL.map(|l| (k, l)));
+    let settings = ParkingType::SQUARE.into_iter().flat_map(|k| Level::ALL.map(|l| (k, l)));
     let of = |(k, l)| (0..SCENES).map(move |i| (k, generate(&config, &vehicle, k, l, SEED, i)));
     settings.flat_map(of).collect()
 }

@@ -171,12 +171,12 @@ fn a_method_for_other_spots_says_so_and_does_not_fail() {
         .assert()
         .success()
         .stdout(
-            contains("No failures in 12 rows").and(contains("sha is not applicable to 6 scenes")),
+            contains("No failures in 15 rows").and(contains("sha is not applicable to 9 scenes")),
         );
     let rows = rows::read_csv(&dir.path().join("out/rows.csv")).unwrap();
-    assert_eq!(rows.len(), 18, "rows are kept");
+    assert_eq!(rows.len(), 24, "rows are kept");
     let report = std::fs::read_to_string(dir.path().join("out/report.md")).unwrap();
-    assert!(report.contains("`sha`: 3 of 3 solved, not applicable to 6 others"), "{report}");
+    assert!(report.contains("`sha`: 3 of 3 solved, not applicable to 9 others"), "{report}");
     let lines = report.lines().filter(|l| l.contains("| sha | this run |"));
     assert!(lines.into_iter().all(|l| l.starts_with("| parallel |")), "{report}");
 }
@@ -283,7 +283,7 @@ fn rows_do_not_depend_on_the_threads() {
             .args(["--out", threads, "--paths", "paths"])
             .assert()
             .success()
-            .stdout(contains("No failures in 18 rows"));
+            .stdout(contains("No failures in 24 rows"));
         let rows = rows::read_csv(&dir.path().join(threads).join("rows.csv")).unwrap();
         rows.iter().map(n3p::episode::Row::untimed).collect::<Vec<_>>()
     };

@@ -11,12 +11,12 @@ use std::fs;
 use std::path::PathBuf;
 
 use n3p::curves::{Path, Segment};
-use n3p::geometry::{Polygon, Pose};
+use n3p::geometry::Pose;
 use n3p::output::drawing::{Drawing, scene_svg};
 use n3p::vehicle::Vehicle;
 use n3p::world::cell::{Cell, Grid};
 use n3p::world::generate::{GeneratorConfig, generate};
-use n3p::world::{Level, ParkingType, Scene};
+use n3p::world::{Level, ParkingType, Scene, Stance};
 
 fn scene(kind: ParkingType, level: Level, index: u64) -> Scene {
     generate(&GeneratorConfig::default(), &Vehicle::default(), kind, level, 5, index)
@@ -80,8 +80,9 @@ fn everything_at_once() {
     let scene = scene(ParkingType::Reverse, Level::Easy, 1);
     let path = some_path(&scene);
     let grid = Grid::default();
-    let cell = Cell { kind: ParkingType::Reverse, lane_width: 6.0, spot_width: 3.0, dead_end: 8.0 };
-    let regions = grid.regions(&cell).map(|r| Polygon::rectangle(Pose::default(), r));
+    let stance = Stance::new(ParkingType::Reverse, 0.0);
+    let cell = Cell { stance, lane_width: 6.0, spot_width: 3.0, dead_end: 8.0 };
+    let regions = grid.regions(&cell);
     let drawing = Drawing {
         other_goals: Vec::new(),
         method: Some("knn-n3p"),

@@ -17,7 +17,7 @@ const SEED: u64 = 31;
 
 fn scenes(count: u64) -> Vec<Scene> {
     let (config, vehicle) = (GeneratorConfig::default(), Vehicle::default());
-    let settings = ParkingType::ALL.into_iter().flat_map(|k| Level::ALL.map(|l| (k, l)));
+    let settings = ParkingType::SQUARE.into_iter().flat_map(|k| Level::ALL.map(|l| (k, l)));
     let of = |(k, l)| (0..count).map(move |i| generate(&config, &vehicle, k, l, SEED, i));
     settings.flat_map(of).collect()
 }

@@ -2,6 +2,7 @@
 
 #![cfg(feature = "lab")]
 
+use std::f64::consts::PI;
 use std::path::Path;
 
 use n3p::geometry::{Aabb, Pose, Vec2, signed_angle};
@@ -21,7 +22,7 @@ const TOL: f64 = 1e-6;
 fn for_each(mut check: impl FnMut(ParkingType, Level, &Scene, &str)) {
     let (config, vehicle) = (GeneratorConfig::default(), Vehicle::default());
     config.validate(&vehicle).unwrap();
-    for kind in ParkingType::ALL {
+    for kind in ParkingType::SQUARE {
         for level in Level::ALL {
             for index in 0..COUNT {
                 let scene = generate(&config, &vehicle, kind, level, SEED, index);
@@ -211,6 +212,61 @@ fn cars_do_not_overlap() {
             }
         }
     });
+}
+
+/// Angled bays lean either way and are driven into either way; their rows are as square ones are, seen
+/// along the way out.
+#[test]
+fn angled_bays_keep_the_laws_of_their_level() {
+    let (config, vehicle) = (GeneratorConfig::default(), Vehicle::default());
+    let (mut against, mut tail_in, mut open) = (0, 0, 0);
+    for (level, index) in Level::ALL.into_iter().flat_map(|l| (0..COUNT).map(move |i| (l, i))) {
+        let scene = generate(&config, &vehicle, ParkingType::Angled, level, SEED, index);
+        let what = format!("seed {SEED}: {}", scene.name);
+        scene.validate(Path::new(&scene.name)).unwrap();
+        let heading = scene.goal.heading;
+        let slant = if heading > 0.0 { heading } else { heading + PI };
+        let degrees = slant.to_degrees();
+        let is_slanted = (30.0..=75.0).contains(&degrees) || (105.0..=150.0).contains(&degrees);
+        assert!(is_slanted, "{what}: {degrees}°");
+        against += u64::from(degrees > 90.0);
+        tail_in += u64::from(heading > 0.0);
+
+        let (start, goal) = (footprint(&scene, scene.start), footprint(&scene, scene.goal));
+        let all = solids(&scene);
+        for solid in &all {
+            assert!(distance(&start, solid) > 0.2 - TOL, "{what}: start");
+            assert!(distance(&goal, solid) > 0.05, "{what}: goal");
+        }
+        let cars: Vec<_> = scene.obstacles.iter().zip(&all).filter(|(o, _)| is_car(o)).collect();
+        for (i, (_, a)) in cars.iter().enumerate() {
+            assert!(cars[..i].iter().all(|(_, b)| distance(a, b) > 0.04), "{what}: {i}");
+        }
+        // Across the way out, from the spot's centre to the row's nearest cars.
+        let across = |v: &[f64; 2]| v[0] * slant.sin() - v[1] * slant.cos();
+        let row = cars.iter().filter(|(o, _)| extent(o).max.y + extent(o).min.y < 2.0);
+        let (mut left, mut right) = (f64::INFINITY, f64::INFINITY);
+        for (o, _) in row {
+            let low = o.iter().map(across).fold(f64::INFINITY, f64::min);
+            let high = o.iter().map(across).fold(f64::NEG_INFINITY, f64::max);
+            if low > 0.0 {
+                right = right.min(low);
+            } else {
+                left = left.min(-high);
+            }
+        }
+        let ([min, max], narrower) = (config.level(level).bay_spot_width, 2.0 * left.min(right));
+        assert!(narrower > min - 1e-9 && narrower < max + 0.6 + 1e-9, "{what}: {left} {right}");
+
+        let boundary = config.bay_depth / 2.0 * slant.sin() + narrower / 2.0 * slant.cos().abs();
+        let walls = scene.obstacles.iter().filter(|o| !is_car(o)).map(|o| extent(o));
+        let ends = walls.filter(|b| b.max.y > boundary + 0.01 && b.min.y < boundary + 5.0);
+        open += u64::from(ends.count() == 0);
+    }
+    let share = |n: u64| n as f64 / (3 * COUNT) as f64;
+    assert!((0.43..0.57).contains(&share(against)), "{against}");
+    assert!((0.43..0.57).contains(&share(tail_in)), "{tail_in}");
+    assert!((100..200).contains(&open), "{open} of {COUNT} easy scenes are open");
 }
 
 #[test]

@@ -51,7 +51,7 @@ fn end(planned: &Planned) -> Option<Pose> {
 
 /// A generated scene with goals beside its own, some of which are in the neighbours.
 fn with_goals(index: u64, moves: &[(f64, f64, bool)]) -> Scene {
-    let kind = ParkingType::ALL[index as usize % 3];
+    let kind = ParkingType::SQUARE[index as usize % 3];
     let config = GeneratorConfig::default();
     let scene = generate(&config, &Vehicle::default(), kind, Level::Easy, 314, index);
     let around = |&(along, across, turned): &(f64, f64, bool)| {

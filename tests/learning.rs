@@ -20,8 +20,8 @@ use n3p::selectors::model::Model;
 use n3p::selectors::network::{LAYERS, LayerWeights, pose_from_outputs};
 use n3p::selectors::{Features, Normaliser, PoseSelector, UNIT_COUNT, UNIT_NAMES};
 use n3p::vehicle::Vehicle;
-use n3p::world::ParkingType;
 use n3p::world::cell::{Axis, Grid};
+use n3p::world::{ParkingType, Stance};
 use proptest::prelude::*;
 use rand::RngExt;
 
@@ -105,7 +105,7 @@ fn samples(kind: ParkingType, cells: &[usize], per_cell: usize, seed: u64) -> Ve
 
 fn knn_of(samples: &[Sample], kinds: &[ParkingType], dir: &Path) -> KnnSelector {
     let path = dir.join("knn.bin");
-    training::knn::train(&metadata(), samples, kinds, &NO_WORLDS, &path).unwrap();
+    training::knn::train(&metadata(), samples, kinds, &NO_WORLDS.into(), &path).unwrap();
     KnnSelector::load(&path).unwrap()
 }
 
@@ -237,8 +237,8 @@ fn one_file_holds_all_types_and_the_same_input_gives_the_same_bytes() {
     let error = training::knn::train(
         &metadata(),
         &samples(KIND, &[0], 5, 1),
-        &ParkingType::ALL,
-        &NO_WORLDS,
+        &ParkingType::SQUARE,
+        &NO_WORLDS.into(),
         &dir.path().join("other.bin"),
     );
     assert!(matches!(error, Err(TrainingError::NoSamples(ParkingType::Forward))));
@@ -250,10 +250,11 @@ fn manoeuvres_are_learnt_in_worlds() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("knn.bin");
     let few = samples(KIND, &[0], 5, 1);
+    let stance = Stance::new(KIND, 0.0);
     let learnt = |count| {
         let config = WorldsConfig { count, seed: 3 };
-        training::knn::train(&metadata(), &few, &[KIND], &config, &path).unwrap();
-        (KnnSelector::load(&path).unwrap().manoeuvres(KIND, &metadata().vehicle), config)
+        training::knn::train(&metadata(), &few, &[KIND], &config.into(), &path).unwrap();
+        (KnnSelector::load(&path).unwrap().manoeuvres(stance, &metadata().vehicle), config)
     };
     let (none, _) = learnt(0);
     let (some, config) = learnt(60);
@@ -275,14 +276,14 @@ fn manoeuvres_are_learnt_in_worlds() {
         },
         ..metadata()
     };
-    training::knn::train(&small, &few, &[KIND], &config, &path).unwrap();
-    let of_small = KnnSelector::load(&path).unwrap().manoeuvres(KIND, &small.vehicle);
+    training::knn::train(&small, &few, &[KIND], &config.into(), &path).unwrap();
+    let of_small = KnnSelector::load(&path).unwrap().manoeuvres(stance, &small.vehicle);
     assert!(of_small.len() > 5, "{}", of_small.len());
     let error = training::knn::train(
         &metadata(),
         &few,
         &[KIND],
-        &WorldsConfig { count: 2_000_000, seed: 3 },
+        &WorldsConfig { count: 2_000_000, seed: 3 }.into(),
         &path,
     );
     assert!(error.unwrap_err().to_string().contains("worlds is 2000000; expected 0 to 1000000"));
@@ -601,7 +602,7 @@ fn one_network_learns_from_several_vehicles_reproducibly() {
     for of_kind in &log.kinds {
         let kind = of_kind.kind;
         assert!(dir.path().join(format!("a.{kind}.training.svg")).exists());
-        let solved = || sets.iter().flat_map(|s| s.solved()).filter(|s| s.cell.kind == kind);
+        let solved = || sets.iter().flat_map(|s| s.solved()).filter(|s| s.cell.kind() == kind);
         assert_eq!(of_kind.samples, solved().count());
         assert_eq!(of_kind.train_rows + of_kind.validation_rows, of_kind.samples);
         assert!(of_kind.losses[of_kind.best_epoch - 1].train < of_kind.losses[0].train);
@@ -609,8 +610,8 @@ fn one_network_learns_from_several_vehicles_reproducibly() {
         let mut errors = Vec::new();
         for set in &sets {
             let vehicle = &set.metadata.vehicle;
-            assert!(!fleet.manoeuvres(kind, vehicle).is_empty());
-            for s in set.solved().filter(|s| s.cell.kind == kind) {
+            assert!(!fleet.manoeuvres(Stance::new(kind, 0.0), vehicle).is_empty());
+            for s in set.solved().filter(|s| s.cell.kind() == kind) {
                 let mut poses = Vec::new();
                 fleet.select(&Features::new(s.start, s.cell), vehicle, 2, &mut poses);
                 assert_eq!(poses.len(), 1);

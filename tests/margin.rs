@@ -62,7 +62,7 @@ fn plans_keep_the_margin_in_the_eyes_of_the_oracle() {
         let mut planner = method.build(&models, &MethodSettings::default()).unwrap();
         let (mut found, mut whole) = (0, 0);
         for i in 0..30 {
-            let kind = ParkingType::ALL[i as usize % 3];
+            let kind = ParkingType::SQUARE[i as usize % 3];
             let set = String::new();
             let case =
                 Case { scene: scene(kind, Level::Easy, i), kind: Some(kind), level: None, set };
@@ -117,7 +117,7 @@ fn results_do_not_depend_on_margins_planned_before() {
         let build = || method.build(&models, &MethodSettings::default()).unwrap();
         let mut used = build();
         for i in 0..12 {
-            let scene = scene(ParkingType::ALL[i as usize % 3], Level::Complex, i);
+            let scene = scene(ParkingType::SQUARE[i as usize % 3], Level::Complex, i);
             for margin in [0.0, 0.15, 0.07, 0.0, 0.15] {
                 let problem = Problem::with_margin(&scene, margin).unwrap();
                 let again = used.plan(&problem, BUDGET);
@@ -131,7 +131,7 @@ fn results_do_not_depend_on_margins_planned_before() {
 
 #[test]
 fn no_margin_is_the_usual_one() {
-    let (models, kinds) = (models(), ParkingType::ALL);
+    let (models, kinds) = (models(), ParkingType::SQUARE);
     let cases = suite::at_home(&Vehicle::default(), &kinds, &Level::ALL, 3, 11).unwrap();
     let rows = |margin_m| {
         let config = SuiteConfig {

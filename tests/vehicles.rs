@@ -22,7 +22,7 @@ const BUDGET: Budget = Budget::new(200_000);
 fn plan_all(models: &Models, method: Method, vehicle: &Vehicle, count: u64) -> [usize; 2] {
     let mut planner = method.build(models, &MethodSettings::default()).unwrap();
     let (mut searched, mut full) = (0, 0);
-    for kind in ParkingType::ALL {
+    for kind in ParkingType::SQUARE {
         for level in Level::ALL {
             for i in 0..count {
                 let scene = generate(&GeneratorConfig::default(), vehicle, kind, level, 909, i);

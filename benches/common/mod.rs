@@ -51,7 +51,7 @@ pub fn problems_of(kind: ParkingType, count: u64) -> Vec<Problem> {
 /// What a selector is asked in `problems`.
 pub fn features(problems: &[Problem], grid: &Grid) -> Vec<Features> {
     let of = |p: &Problem| {
-        let found = abstractions(&p.obstacles, p.kind?, grid);
+        let found = abstractions(&p.obstacles, p.stance()?, grid);
         found.first().map(|f| Features::new(p.start, f.cell))
     };
     problems.iter().filter_map(of).collect()

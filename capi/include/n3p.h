@@ -83,6 +83,10 @@ typedef enum n3p_parking_type {
      * Along the lane.
      */
     N3P_PARKING_PARALLEL = 3,
+    /**
+     * A bay at 30 to 150 degrees to the lane, nose in or tail in.
+     */
+    N3P_PARKING_ANGLED = 4,
 } n3p_parking_type;
 
 /**

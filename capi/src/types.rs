@@ -148,6 +148,8 @@ pub enum n3p_parking_type {
     N3P_PARKING_REVERSE = 2,
     /// Along the lane.
     N3P_PARKING_PARALLEL = 3,
+    /// A bay at 30 to 150 degrees to the lane, nose in or tail in.
+    N3P_PARKING_ANGLED = 4,
 }
 
 pub(crate) fn parking_type(number: i32) -> Result<Option<ParkingType>> {
@@ -156,8 +158,9 @@ pub(crate) fn parking_type(number: i32) -> Result<Option<ParkingType>> {
         n if n == n3p_parking_type::N3P_PARKING_FORWARD as i32 => Ok(Some(ParkingType::Forward)),
         n if n == n3p_parking_type::N3P_PARKING_REVERSE as i32 => Ok(Some(ParkingType::Reverse)),
         n if n == n3p_parking_type::N3P_PARKING_PARALLEL as i32 => Ok(Some(ParkingType::Parallel)),
+        n if n == n3p_parking_type::N3P_PARKING_ANGLED as i32 => Ok(Some(ParkingType::Angled)),
         other => {
-            let text = format!("parking_type is {other}; expected an n3p_parking_type, 0 to 3");
+            let text = format!("parking_type is {other}; expected an n3p_parking_type, 0 to 4");
             Err(Failure::bad_input(text))
         }
     }
@@ -170,6 +173,7 @@ pub(crate) fn parking_number(kind: Option<ParkingType>) -> i32 {
         Some(ParkingType::Forward) => n3p_parking_type::N3P_PARKING_FORWARD,
         Some(ParkingType::Reverse) => n3p_parking_type::N3P_PARKING_REVERSE,
         Some(ParkingType::Parallel) => n3p_parking_type::N3P_PARKING_PARALLEL,
+        Some(ParkingType::Angled) => n3p_parking_type::N3P_PARKING_ANGLED,
     }) as i32
 }
 

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from n3p.columns import Rows, Trajectory
 from n3p.errors import N3PError
 
-ParkingType = Literal["forward", "reverse", "parallel"]
+ParkingType = Literal["forward", "reverse", "parallel", "angled"]
 Level = Literal["easy", "complex", "extreme"]
 Effort = Literal["first", "usual", "most"]
 Path = Union[str, PathLike[str]]

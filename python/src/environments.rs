@@ -314,7 +314,10 @@ fn course_of(
         (kinds.is_empty() || kinds.contains(&s.kind))
             && (levels.is_empty() || levels.contains(&s.level))
     };
-    let strata = (0..Stratum::COUNT).map(Stratum::nth).filter(of_these).collect();
+    let strata: Vec<Stratum> = (0..Stratum::COUNT).map(Stratum::nth).filter(of_these).collect();
+    if strata.is_empty() {
+        return Err(Fault::bad("type: no course has angled bays; give them as scenes"));
+    }
     Ok(Source::Course(named, strata))
 }
 

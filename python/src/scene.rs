@@ -48,7 +48,7 @@ use crate::{json, plan};
 ///     Instead of ``goal``: poses of which the cheapest is taken.
 /// tolerance : (float, float), optional
 ///     How far from a goal the car may stop: metres (up to 1), radians (up to 0.5).
-/// parking_type : {"forward", "reverse", "parallel"}, optional
+/// parking_type : {"forward", "reverse", "parallel", "angled"}, optional
 ///     How the goal lies in its spot, where that is known; it is found otherwise.
 /// vehicle : Vehicle or dict, optional
 ///     The car; the default one where it is left out.
@@ -182,7 +182,7 @@ pub fn load_scene(path: &Bound<'_, PyAny>) -> Result<Scene, Fault> {
 ///
 /// Parameters
 /// ----------
-/// type : {"forward", "reverse", "parallel"}
+/// type : {"forward", "reverse", "parallel", "angled"}
 ///     Parking type.
 /// level : {"easy", "complex", "extreme"}
 ///     Difficulty.

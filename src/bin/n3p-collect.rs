@@ -17,7 +17,7 @@ use n3p::world::ParkingType;
 #[derive(Parser)]
 #[command(version)]
 struct Args {
-    /// Parking type; all when omitted
+    /// Parking type; forward, reverse and parallel when omitted
     #[arg(long = "type", value_name = "TYPE")]
     kind: Option<ParkingType>,
     /// Settings, a TOML file; the defaults when omitted
@@ -53,7 +53,7 @@ fn run(args: &Args) -> anyhow::Result<ExitCode> {
     if let Some(path) = &args.vehicle {
         config.vehicle = Vehicle::read(path).or_bad_input()?;
     }
-    let kinds = args.kind.map_or(ParkingType::ALL.to_vec(), |kind| vec![kind]);
+    let kinds = args.kind.map_or(ParkingType::SQUARE.to_vec(), |kind| vec![kind]);
     let options = CollectOptions { resume: args.resume, part: args.shard };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.into()).build()?;
     let begin = Instant::now();

@@ -86,6 +86,9 @@ struct KnnArgs {
     /// Seed of the worlds; that of the data set when omitted
     #[arg(long, value_name = "S")]
     seed: Option<u64>,
+    /// Samples stored of each cell, at most; the manoeuvres are learnt from all
+    #[arg(long, value_name = "N", default_value_t = u32::MAX, hide_default_value = true)]
+    samples_per_cell: u32,
 }
 
 #[derive(Args)]
@@ -210,8 +213,9 @@ fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
     artefact::check_writable(&args.out).or_bad_input()?;
     let (data, kinds) = read(&args.common)?;
     let seed = args.seed.unwrap_or(data.metadata.seed);
-    let config = WorldsConfig { count: args.worlds, seed };
+    let worlds = WorldsConfig { count: args.worlds, seed };
     let begin = Instant::now();
+    let config = training::knn::KnnConfig { worlds, samples_per_cell: args.samples_per_cell };
     let log = training::knn::train(&data.metadata, &data.samples, &kinds, &config, &args.out)
         .map_err(|e| exit_code(e, &args.common.data))?;
     for training::knn::KnnKindLog { kind, samples, occupied_cells, manoeuvres, .. } in &log.kinds {
@@ -233,9 +237,9 @@ fn fleet(args: &FleetArgs) -> anyhow::Result<ExitCode> {
     let sets = sets.collect::<anyhow::Result<Vec<_>>>()?;
     for (i, (set, folder)) in sets.iter().zip(&args.data).enumerate() {
         let bad = |what: String| BadInput(format!("--data {}: {what}", folder.display()));
-        let solved = |kind| set.solved().filter(|s| s.cell.kind == kind).count();
+        let solved = |kind| set.solved().filter(|s| s.cell.kind() == kind).count();
         let least = training::mlp::LEAST_SAMPLES;
-        if let Some(kind) = ParkingType::ALL.into_iter().find(|k| solved(*k) < least) {
+        if let Some(kind) = ParkingType::SQUARE.into_iter().find(|k| solved(*k) < least) {
             let count = solved(kind);
             let text =
                 format!("it has {count} solved samples of type {kind}; at least {least} needed");

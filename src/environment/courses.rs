@@ -26,19 +26,19 @@ pub enum Course {
 /// A kind of problems of their own difficulty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Stratum {
-    /// The parking type.
+    /// The parking type, one of the paper's: no course has angled bays.
     pub kind: ParkingType,
     /// The level: of generated scenes, or of the sizes that cells are drawn with.
     pub level: Level,
 }
 
 impl Stratum {
-    /// How many there are.
+    /// How many there are: of the paper's three types.
     pub const COUNT: usize = 9;
 
     /// The stratum of an index below [`Stratum::COUNT`].
     pub fn nth(index: usize) -> Self {
-        Self { kind: ParkingType::ALL[index / 3], level: Level::ALL[index % 3] }
+        Self { kind: ParkingType::SQUARE[index / 3], level: Level::ALL[index % 3] }
     }
 }
 
@@ -89,10 +89,11 @@ fn cell_problem(vehicle: &Vehicle, stratum: Stratum, rng: &mut ChaCha8Rng) -> Pr
         let spot_width = between(widths);
         let closed = between([0.0, 1.0]) < sizes.dead_end_probability;
         let dead_end = if closed { between(sizes.dead_end) } else { grid.dead_end.max };
-        let cell = Cell { kind, lane_width, spot_width, dead_end };
-        let goal = grid.goal(kind, vehicle);
+        let stance = grid.stances(kind)[0];
+        let cell = Cell { stance, lane_width, spot_width, dead_end };
+        let goal = grid.goal(stance, vehicle);
         let Ok(mut problem) = Problem::in_cell(&grid, &cell, *vehicle, goal) else { continue };
-        let [lane, _] = grid.regions(&cell);
+        let lane = grid.lane(&cell);
         let start = (0..DRAWS).find_map(|_| {
             let x = between([start_x[0], start_x[1].min(lane.max.x)]);
             let y = between([lane.min.y, lane.max.y]);

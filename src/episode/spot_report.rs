@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::Episode;
-use crate::geometry::{Aabb, Polygon, Pose, Vec2};
+use crate::geometry::{Polygon, Pose};
 use crate::n3p::{Method, Models};
 use crate::world::ParkingType;
 use crate::world::abstraction::{Abstraction, abstractions};
@@ -25,7 +25,7 @@ pub struct SpotReport {
     pub lane_width_m: Option<f64>,
     /// Width of the spot.
     pub spot_width_m: Option<f64>,
-    /// From the spot's centre along the lane to its end; the model's largest stands for none.
+    /// From the spot's mouth along the lane to its end; the model's largest stands for none.
     pub dead_end_m: Option<f64>,
     /// Corners of the largest lane and of the spot, as the model's grid has them.
     pub lane_and_spot: Option<[Vec<[f64; 2]>; 2]>,
@@ -67,19 +67,16 @@ pub fn abstraction(episode: &Episode, models: &Models) -> Option<(Abstraction, G
     let problem = &episode.problem;
     episode.result.guidance.as_ref()?;
     let method: Method = episode.row.method.parse().ok()?;
-    let grid = *models.selector(method, &problem.vehicle)?.grid();
-    let found = abstractions(&problem.obstacles, problem.kind?, &grid);
+    let grid = *models.selector(method, &problem.vehicle)?.grid(problem.kind?);
+    let found = abstractions(&problem.obstacles, problem.stance()?, &grid);
     Some((*found.first()?, grid))
 }
 
-/// Its lane's and its spot's rectangle, in the scene's frame.
+/// Its lane and its spot, in the scene's frame.
 pub fn regions(episode: &Episode, models: &Models) -> Option<[Polygon; 2]> {
     let (found, grid) = abstraction(episode, models)?;
     let frame = &episode.problem.frame;
-    let to_world = |region: Aabb| {
-        Polygon::rectangle(Pose::default(), region).map(|v: Vec2| frame.world_from_local_point(v))
-    };
-    Some(found.regions(&grid).map(to_world))
+    Some(found.regions(&grid).map(|region| region.map(|v| frame.world_from_local_point(v))))
 }
 
 impl fmt::Display for SpotReport {

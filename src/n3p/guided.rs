@@ -20,6 +20,7 @@ use crate::planners::{
     Budget, Effort, Guidance, HybridAStar, HybridAStarConfig, NoPath, PlanResult, Planner, Problem,
     Route,
 };
+use crate::world::Stance;
 use crate::world::abstraction::{Abstraction, abstractions};
 
 use crate::selectors::{Features, PoseSelector};
@@ -127,20 +128,21 @@ impl GuidedPlanner {
 
     /// Asks for up to `k` poses for an abstraction of `problem`, in the planning frame.
     fn select(&mut self, problem: &Problem, found: &Abstraction, k: usize) {
-        // The cell's frame lies `shift` further out than the problem's.
-        let start = Pose { y: problem.start.y - found.shift, ..problem.start };
+        let start = found.in_cell(problem.start);
         self.poses.clear();
         let features = Features::new(start, found.cell);
         self.selector.select(&features, &problem.vehicle, k, &mut self.poses);
         for pose in &mut self.poses {
-            pose.y += found.shift;
+            *pose = found.from_cell(*pose);
         }
     }
 
     /// The cells found around the spot, the largest first.
     fn cells(&self, problem: &Problem) -> Vec<Abstraction> {
-        let of_kind = |kind| abstractions(&problem.obstacles, kind, self.selector.grid());
-        problem.kind.map_or_else(Vec::new, of_kind)
+        let beside = |stance: Stance| {
+            abstractions(&problem.obstacles, stance, self.selector.grid(stance.kind()))
+        };
+        problem.stance().map_or_else(Vec::new, beside)
     }
 
     fn plan_paper(&mut self, problem: &Problem, left: &mut usize) -> Attempt {

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use super::method::{Learnt, Method};
 use super::{Driver, TrainedPolicy, more};
 use crate::selectors::artefact::{self, ArtefactError, Fault, find_model};
+use crate::selectors::by_kind::ByKind;
 use crate::selectors::mlp::MlpSelector;
 use crate::selectors::model::Model;
 use crate::selectors::{PoseSelector, shipped};
@@ -24,7 +25,8 @@ pub struct Models {
     outside: Option<Arc<dyn Driver>>,
 }
 
-/// The models of one vehicle: at most one KNN and one MLP selector and one policy of each course.
+/// The models of one vehicle: for each parking type at most one KNN and one MLP selector, and one
+/// policy of each course.
 #[derive(Clone)]
 pub struct VehicleModels {
     origin: Origin,
@@ -47,8 +49,8 @@ pub enum ModelsError {
     /// A file cannot be loaded, or was trained for another vehicle than those before it.
     #[error("--model: {0}")]
     Load(#[from] ArtefactError),
-    /// Two KNN files were given.
-    #[error("--model {0}: a KNN model was given before; one file holds all types: give one")]
+    /// Two KNN files of one parking type were given.
+    #[error("--model {0}: a KNN model of its types was given before: give one")]
     TwoKnn(PathBuf),
     /// Two models for any vehicle were given.
     #[error("--model {0}: a model for any vehicle was given before; give one")]
@@ -111,10 +113,16 @@ impl Models {
         let own = self.of_exactly(Origin { path, training, vehicle });
         match model {
             Model::Fleet(_) => unreachable!("it has no vehicle"),
-            Model::Knn(knn) if own.knn.is_some() => {
+            Model::Knn(knn) if own.knows_one_of(&knn.kinds()) => {
                 return Err(ModelsError::TwoKnn(knn.path().to_owned()));
             }
-            Model::Knn(knn) => own.knn = Some(Arc::new(knn)),
+            Model::Knn(knn) => {
+                let new: Arc<dyn PoseSelector> = Arc::new(knn);
+                own.knn = Some(match own.knn.take() {
+                    Some(other) => Arc::new(ByKind(other, new)),
+                    None => new,
+                });
+            }
             Model::Mlp(mlp) => {
                 own.mlp = Some(Arc::new(match own.mlp.take() {
                     Some(others) => Arc::unwrap_or_clone(others).combine(mlp)?,
@@ -156,8 +164,8 @@ impl Models {
         self.outside.as_ref()
     }
 
-    /// Loads what `methods` need from the usual files, as far as they exist: `knn.bin` and
-    /// `knn-….bin`, `mlp-TYPE.safetensors`, `rl-COURSE.safetensors`, `fleet.safetensors`. The last,
+    /// Loads what `methods` need from the usual files, as far as they exist: `knn.bin` and, for other
+    /// types and vehicles, `knn-….bin`, `mlp-TYPE.safetensors`, `rl-COURSE.safetensors`, `fleet.safetensors`. The last,
     /// which is for any vehicle, is left out where others serve the `vehicle` that is asked for.
     pub fn usual(methods: &[Method], vehicle: Option<&Vehicle>) -> Result<Self, ModelsError> {
         let knn = methods.iter().any(|m| matches!(m.learnt(), Some(Learnt::Knn | Learnt::Either)));
@@ -167,17 +175,18 @@ impl Models {
         }
         if methods.iter().any(|m| m.learnt() == Some(Learnt::Mlp)) {
             let network = |kind| find_model(format!("mlp-{kind}.safetensors"));
-            found.extend(ParkingType::ALL.map(network));
+            found.extend(ParkingType::SQUARE.map(network));
         }
         let courses = methods.iter().filter_map(|m| m.course());
         found.extend(courses.map(|course| find_model(format!("rl-{course}.safetensors"))));
         found.retain(|path| artefact::exists(path));
         let mut models = Self::load(&found)?;
         if knn {
-            for path in knn_of_other_vehicles() {
+            for path in further_knn() {
                 let model = Model::load(&path)?;
                 let known = |m: &VehicleModels| {
-                    m.knn.is_some() && model.vehicle().is_some_and(|v| m.vehicle().is_like(v))
+                    m.knows_one_of(&model.kinds())
+                        && model.vehicle().is_some_and(|v| m.vehicle().is_like(v))
                 };
                 if models.vehicles.iter().any(known) {
                     tracing::warn!("{}: left out: its vehicle has a model", path.display());
@@ -188,8 +197,8 @@ impl Models {
         }
         let serves = |&&m: &&Method| {
             let own = vehicle.and_then(|v| models.serving(m, v));
-            own.and_then(|own| own.selector(m))
-                .is_some_and(|s| s.kinds().len() == ParkingType::ALL.len())
+            let known = own.and_then(|own| own.selector(m)).map_or(Vec::new(), |s| s.kinds());
+            ParkingType::SQUARE.iter().all(|kind| known.contains(kind))
         };
         let any = find_model("fleet.safetensors");
         let mut use_it = methods.iter().filter(|m| uses_networks(**m));
@@ -293,7 +302,7 @@ fn uses_networks(method: Method) -> bool {
 }
 
 /// Files `models/knn-….bin`, and those compiled in, by name.
-fn knn_of_other_vehicles() -> Vec<PathBuf> {
+fn further_knn() -> Vec<PathBuf> {
     named(|name| name.starts_with("knn-") && name.ends_with(".bin"))
 }
 
@@ -326,6 +335,11 @@ impl VehicleModels {
     /// The trained policy of a course, if there is one.
     pub fn driver(&self, course: &str) -> Option<&Arc<dyn Driver>> {
         self.drivers.get(course)
+    }
+
+    /// Whether the KNN selector knows one of these types.
+    fn knows_one_of(&self, kinds: &[ParkingType]) -> bool {
+        self.knn.as_ref().is_some_and(|knn| knn.kinds().iter().any(|kind| kinds.contains(kind)))
     }
 
     /// Whether they hold what `method` plans with.

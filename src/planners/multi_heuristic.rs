@@ -135,8 +135,9 @@ mod tests {
     fn a_parked_car_is_deep_in_parallel_spots_only() {
         let vehicle = Vehicle::default();
         for kind in ParkingType::ALL {
-            let cell = Cell { kind, lane_width: 6.0, spot_width: 7.0, dead_end: 12.0 };
-            let start = Pose::new(-3.0, 4.5, 0.0);
+            let stance = Grid::default().stances(kind)[0];
+            let cell = Cell { stance, lane_width: 6.0, spot_width: 7.0, dead_end: 12.0 };
+            let start = Pose::new(Grid::default().lane(&cell).min.x + 4.0, 4.5, 0.0);
             let problem = Problem::in_cell(&Grid::default(), &cell, vehicle, start).unwrap();
             let mut guides = Guides::new(MultiHeuristicConfig::default());
             guides.reset(&problem);

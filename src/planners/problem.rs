@@ -7,7 +7,7 @@ use crate::world::cell::{Cell, Grid};
 use crate::world::collision::CollisionWorld;
 use crate::world::scene::InvalidField;
 use crate::world::spot::{self, Precision, SpotGuess};
-use crate::world::{GoalTolerance, ObstacleError, Obstacles, ParkingType, Scene};
+use crate::world::{GoalTolerance, ObstacleError, Obstacles, ParkingType, Scene, Stance};
 
 /// What planners see: everything in the planning frame (the spot frame where the scene
 /// has a spot, else the goal's own frame), so that results do not depend on where in the
@@ -251,16 +251,17 @@ impl Problem {
 
     fn seen(scene: &Scene, terms: Terms, precision: Precision) -> Result<Problem, ProblemError> {
         scene.check_numbers()?;
-        let SpotGuess { frame, kind, obstacles, mouth } = spot::guess(scene, precision)?;
+        let SpotGuess { frame, stance, obstacles, mouth } = spot::guess(scene, precision)?;
         let bounds = scene.bounds.map(|b| spot::bounds_in_frame(b, &frame, precision));
         let start = precision.pose(frame.local_from_world(scene.start));
         let goal = match precision {
             Precision::Given => frame.local_from_world(scene.goal),
             // By the frame's definition, without its rounding.
-            Precision::Rounded => kind.map_or(Pose::default(), |kind| {
-                scene.vehicle.rear_axle(Pose::new(0.0, 0.0, kind.goal_heading()))
+            Precision::Rounded => stance.map_or(Pose::default(), |stance| {
+                scene.vehicle.rear_axle(Pose::new(0.0, 0.0, stance.heading()))
             }),
         };
+        let kind = stance.map(Stance::kind);
         let seen =
             Self::checked(scene.vehicle, frame, kind, [start, goal], obstacles, bounds, terms);
         let mut problem = seen?;
@@ -276,10 +277,10 @@ impl Problem {
         vehicle: Vehicle,
         start: Pose,
     ) -> Result<Problem, ProblemError> {
-        let goal = grid.goal(cell.kind, &vehicle);
+        let goal = grid.goal(cell.stance, &vehicle);
         let (walls, ends) = (grid.walls(cell)?, [start, goal]);
         let terms = Terms::default();
-        Self::checked(vehicle, Frame::WORLD, Some(cell.kind), ends, walls, None, terms)
+        Self::checked(vehicle, Frame::WORLD, Some(cell.kind()), ends, walls, None, terms)
     }
 
     pub(super) fn checked(
@@ -362,10 +363,11 @@ impl Problem {
     /// poses from which a straight leads to the parked pose. Both gears for parallel spots,
     /// where a car backs in and pulls forward, and where the kind of spot is unknown.
     pub fn entry_gears(&self) -> &'static [Gear] {
-        match self.kind {
-            Some(ParkingType::Forward) => &[Gear::Forward],
-            Some(ParkingType::Reverse) => &[Gear::Backward],
-            Some(ParkingType::Parallel) | None => &[Gear::Forward, Gear::Backward],
-        }
+        self.stance().map_or(&[Gear::Forward, Gear::Backward], Stance::entry_gears)
+    }
+
+    /// How the parked car stands in its spot; `None` where no spot is known.
+    pub fn stance(&self) -> Option<Stance> {
+        self.kind.map(|kind| Stance::new(kind, self.goal.heading))
     }
 }

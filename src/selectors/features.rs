@@ -53,7 +53,7 @@ impl Features {
             of_radius(cell.lane_width),
             of_radius(cell.spot_width),
             of_radius(cell.dead_end),
-            of_radius(grid.lane_boundary(cell.kind)),
+            of_radius(grid.lane_boundary(cell.stance)),
             of_radius(vehicle.length),
             of_radius(vehicle.width),
             of_radius(vehicle.rear_overhang),
@@ -82,13 +82,13 @@ pub const UNIT_NAMES: [&str; UNIT_COUNT] = [
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::world::ParkingType;
+    use crate::world::{ParkingType, Stance};
 
     #[test]
     fn a_model_for_any_vehicle_sees_a_larger_car_in_a_larger_world_the_same() {
         let (grid, car) = (Grid::default(), Vehicle::default());
-        let kind = ParkingType::Reverse;
-        let cell = Cell { kind, lane_width: 5.0, spot_width: 2.5, dead_end: 6.0 };
+        let stance = Stance::new(ParkingType::Reverse, 0.0);
+        let cell = Cell { stance, lane_width: 5.0, spot_width: 2.5, dead_end: 6.0 };
         let small = Features::new(Pose::new(-3.0, 5.0, 0.2), cell);
         let larger = Vehicle {
             length: 2.0 * car.length,
@@ -97,7 +97,7 @@ mod tests {
             rear_overhang: 2.0 * car.rear_overhang,
             ..car
         };
-        let cell = Cell { kind, lane_width: 10.0, spot_width: 5.0, dead_end: 12.0 };
+        let cell = Cell { stance, lane_width: 10.0, spot_width: 5.0, dead_end: 12.0 };
         let large = Features::new(Pose::new(-6.0, 10.0, 0.2), cell);
         let [a, b] = [small.unit_values(&grid, &car), large.unit_values(&grid, &larger)];
         for ((name, a), b) in UNIT_NAMES.into_iter().zip(a).zip(b) {

@@ -26,8 +26,8 @@ use super::{Features, Normaliser, PoseSelector, UNIT_COUNT, UNIT_NAMES};
 use crate::curves::Segment;
 use crate::geometry::Pose;
 use crate::vehicle::Vehicle;
-use crate::world::ParkingType;
 use crate::world::cell::Grid;
+use crate::world::{ParkingType, Stance};
 
 /// The format version written and read by this program.
 pub const VERSION: u32 = 2;
@@ -168,7 +168,7 @@ impl FleetSelector {
     /// The predicted preparatory pose of `vehicle` (rear axle, spot frame); `None` for a parking
     /// type that it does not know.
     pub fn predict(&self, features: &Features, vehicle: &Vehicle) -> Option<Pose> {
-        let at = self.position(features.cell.kind)?;
+        let at = self.position(features.cell.kind())?;
         let Scaling { input, output } = &self.header.scaling[at];
         let input = input.normalise(features.unit_values(&self.header.grid, vehicle));
         let pose = pose_from_outputs(output.restore(self.kinds[at].network.forward(&input)));
@@ -200,12 +200,12 @@ impl PoseSelector for FleetSelector {
         }
     }
 
-    fn manoeuvres(&self, kind: ParkingType, vehicle: &Vehicle) -> Vec<Vec<Segment>> {
-        let of_kind = self.position(kind).map_or(&[][..], |at| &self.kinds[at].manoeuvres);
+    fn manoeuvres(&self, stance: Stance, vehicle: &Vehicle) -> Vec<Vec<Segment>> {
+        let of_kind = self.position(stance.kind()).map_or(&[][..], |at| &self.kinds[at].manoeuvres);
         of_kind.iter().map(|m| scaled(m, vehicle.turning_radius())).collect()
     }
 
-    fn grid(&self) -> &Grid {
+    fn grid(&self, _kind: ParkingType) -> &Grid {
         &self.header.grid
     }
 

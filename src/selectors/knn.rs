@@ -23,8 +23,8 @@ use super::{Features, PoseSelector};
 use crate::curves::Segment;
 use crate::geometry::{Pose, signed_angle};
 use crate::vehicle::Vehicle;
-use crate::world::ParkingType;
 use crate::world::cell::Grid;
+use crate::world::{ParkingType, Stance};
 
 /// The KNN selector. A cell's search tree is built when the cell is first asked for (some
 /// ten microseconds), so that loading costs little more than the checksum.
@@ -112,14 +112,14 @@ impl KnnSelector {
 
     /// The cell whose samples answer for `cell`: itself, or where it has none the nearest
     /// smaller one, by grid steps in all three parameters together; of equally near ones
-    /// the one with the widest lane, then the widest spot.
+    /// the one with the widest lane, then the widest spot. The parked car stands as in `cell`.
     pub fn source_cell(&self, kind: usize, cell: usize) -> Option<usize> {
         if !self.file.samples(kind, cell).is_empty() {
             return Some(cell);
         }
         let header = self.file.header();
         let (grid, parking_type) = (&header.grid, header.kinds[kind].kind);
-        let [lane, spot, dead] = grid.place(parking_type, cell);
+        let [stance, lane, spot, dead] = grid.place(parking_type, cell);
         let mut best: Option<(usize, usize)> = None;
         for l in (0..=lane).rev() {
             for s in (0..=spot).rev() {
@@ -128,7 +128,7 @@ impl KnnSelector {
                     if best.is_some_and(|(least, _)| steps >= least) {
                         break;
                     }
-                    let candidate = grid.index(parking_type, [l, s, d]);
+                    let candidate = grid.index(parking_type, [stance, l, s, d]);
                     if !self.file.samples(kind, candidate).is_empty() {
                         best = Some((steps, candidate));
                     }
@@ -143,7 +143,7 @@ impl KnnSelector {
     pub fn nearest(&self, features: &Features, n: usize) -> Vec<Neighbour> {
         let header = self.file.header();
         let source = || {
-            let kind = header.kinds.iter().position(|k| k.kind == features.cell.kind)?;
+            let kind = header.kinds.iter().position(|k| k.kind == features.cell.kind())?;
             Some((kind, self.source_cell(kind, header.grid.floor(&features.cell)?)?))
         };
         let (Some((kind, cell)), Some(n)) = (source(), NonZero::new(n)) else {
@@ -209,7 +209,7 @@ impl CellPoints {
 impl PoseSelector for KnnSelector {
     fn select(&self, features: &Features, _vehicle: &Vehicle, k: usize, out: &mut Vec<Pose>) {
         let header = self.file.header();
-        let Some(kind) = header.kinds.iter().position(|h| h.kind == features.cell.kind) else {
+        let Some(kind) = header.kinds.iter().position(|h| h.kind == features.cell.kind()) else {
             return;
         };
         let first = out.len();
@@ -229,13 +229,16 @@ impl PoseSelector for KnnSelector {
         }
     }
 
-    fn manoeuvres(&self, kind: ParkingType, _vehicle: &Vehicle) -> Vec<Vec<Segment>> {
-        let kinds = &self.file.header().kinds;
-        let Some(kind) = kinds.iter().position(|h| h.kind == kind) else { return Vec::new() };
-        (0..kinds[kind].manoeuvres).map(|i| self.file.segments(kind, i).collect()).collect()
+    fn manoeuvres(&self, stance: Stance, _vehicle: &Vehicle) -> Vec<Vec<Segment>> {
+        let header = self.file.header();
+        let Some(kind) = header.kinds.iter().position(|h| h.kind == stance.kind()) else {
+            return Vec::new();
+        };
+        let known = header.kinds[kind].manoeuvres_for(stance, &header.grid);
+        known.into_iter().map(|i| self.file.segments(kind, i).collect()).collect()
     }
 
-    fn grid(&self) -> &Grid {
+    fn grid(&self, _kind: ParkingType) -> &Grid {
         &self.file.header().grid
     }
 

@@ -34,10 +34,10 @@ use serde::{Deserialize, Serialize};
 use super::artefact::{ArtefactError, Fault};
 use crate::curves::Segment;
 use crate::files::sha256;
-use crate::geometry::{Pose, wrap_angle};
+use crate::geometry::{Pose, signed_angle, wrap_angle};
 use crate::vehicle::Vehicle;
-use crate::world::ParkingType;
 use crate::world::cell::Grid;
+use crate::world::{ParkingType, Stance};
 
 /// First bytes of every `knn.bin`.
 pub const MAGIC: [u8; 8] = *b"N3P-KNN\0";
@@ -88,6 +88,37 @@ pub struct KindHeader {
     pub manoeuvres: usize,
     /// Number of segments of all manoeuvres.
     pub segments: usize,
+    /// How many of the manoeuvres are for each of the grid's stances, in their order; none where all
+    /// are for all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub manoeuvres_by_stance: Vec<usize>,
+}
+
+/// Manoeuvres of stances within this of a car's own may serve it, radians: two or three of the usual
+/// grid.
+const NEAR_STANCE: f64 = 15.001 * PI / 180.0;
+
+impl KindHeader {
+    /// The manoeuvres that may serve a car that stands so, those of most use first: of each near
+    /// stance in turn.
+    pub(super) fn manoeuvres_for(&self, stance: Stance, grid: &Grid) -> Vec<usize> {
+        if self.manoeuvres_by_stance.is_empty() {
+            return (0..self.manoeuvres).collect();
+        }
+        let mut end = 0;
+        let each = self.manoeuvres_by_stance.iter().map(|count| {
+            end += count;
+            end - count..end
+        });
+        let is_near = |(of, _): &(Stance, Range<usize>)| {
+            signed_angle(of.heading(), stance.heading()).abs() < NEAR_STANCE
+        };
+        let near = grid.stances(self.kind).into_iter().zip(each).filter(is_near);
+        let near: Vec<_> = near.map(|(_, range)| range).collect();
+        let most = near.iter().map(Range::len).max().unwrap_or(0);
+        let of_rank = |rank| near.iter().filter_map(move |range| range.clone().nth(rank));
+        (0..most).flat_map(of_rank).collect()
+    }
 }
 
 /// One stored sample.
@@ -280,6 +311,13 @@ fn sections(bytes: &[u8], payload: usize, header: &KnnHeader) -> Result<Vec<Sect
         if k.cells != cells {
             return Err(format!("{}: expected {cells} cells, got {}", k.kind, k.cells));
         }
+        let by_stance = &k.manoeuvres_by_stance;
+        let fits = by_stance.len() == header.grid.stances(k.kind).len()
+            && by_stance.iter().try_fold(0, |sum: usize, n| sum.checked_add(*n))
+                == Some(k.manoeuvres);
+        if !by_stance.is_empty() && !fits {
+            return Err(format!("{}: the manoeuvres of its stances do not add up", k.kind));
+        }
         let size = k
             .samples
             .checked_mul(START_BYTES + POSE_BYTES)
@@ -334,7 +372,6 @@ fn pose([x, y, heading]: [i32; 3], extent: f64, steps: f64) -> Pose {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::signed_angle;
 
     #[test]
     fn poses_keep_their_micrometres() {

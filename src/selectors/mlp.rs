@@ -139,7 +139,7 @@ impl MlpSelector {
     /// The predicted preparatory pose (rear axle, spot frame); `None` for a parking type
     /// without a network.
     pub fn predict(&self, features: &Features) -> Option<Pose> {
-        let trained = self.networks.iter().find(|n| n.header.kind == features.cell.kind)?;
+        let trained = self.networks.iter().find(|n| n.header.kind == features.cell.kind())?;
         let input = trained.header.input.normalise(features.values());
         let output = trained.network.forward(&input);
         Some(network::pose_from_outputs(trained.header.output.restore(output)))
@@ -154,7 +154,7 @@ impl PoseSelector for MlpSelector {
         }
     }
 
-    fn grid(&self) -> &Grid {
+    fn grid(&self, _kind: ParkingType) -> &Grid {
         &self.networks[0].header.grid
     }
 

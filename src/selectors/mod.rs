@@ -1,11 +1,13 @@
 //! Preparatory poses: learnt selectors and their files.
 //!
 //! A [`PoseSelector`] ranks preparatory poses for [`Features`]; [`knn`] and [`mlp`] are
-//! the two of the paper, [`fleet`] is one for any vehicle. [`artefact`] reads and checks their files,
+//! the two of the paper, [`fleet`] is one for any vehicle; [`by_kind`] joins two of
+//! different parking types. [`artefact`] reads and checks their files,
 //! [`model`] tells them apart, [`shipped`] has those compiled in. Read next: [`knn_file`] and
 //! [`network`] for what the files hold, [`mod@crate::n3p`] for the planner that uses a selector.
 
 pub mod artefact;
+pub mod by_kind;
 mod features;
 pub mod fleet;
 pub mod knn;
@@ -23,8 +25,8 @@ pub use normaliser::Normaliser;
 use crate::curves::Segment;
 use crate::geometry::Pose;
 use crate::vehicle::Vehicle;
-use crate::world::ParkingType;
 use crate::world::cell::Grid;
+use crate::world::{ParkingType, Stance};
 
 /// Ranks preparatory poses. Implementations are immutable and shared between threads.
 pub trait PoseSelector: Send + Sync {
@@ -32,14 +34,14 @@ pub trait PoseSelector: Send + Sync {
     /// best first. Appends none where the model knows nothing, such as an infeasible cell.
     fn select(&self, features: &Features, vehicle: &Vehicle, k: usize, out: &mut Vec<Pose>);
 
-    /// The manoeuvres it knows for spots of a type: motions in driving order that end at the
+    /// The manoeuvres it knows for cars that stand so: motions in driving order that end at the
     /// parked pose, drivable by `vehicle`. None by default.
-    fn manoeuvres(&self, _kind: ParkingType, _vehicle: &Vehicle) -> Vec<Vec<Segment>> {
+    fn manoeuvres(&self, _stance: Stance, _vehicle: &Vehicle) -> Vec<Vec<Segment>> {
         Vec::new()
     }
 
-    /// The grid of cells the model was trained on.
-    fn grid(&self) -> &Grid;
+    /// The grid of cells the model was trained on for a parking type.
+    fn grid(&self, kind: ParkingType) -> &Grid;
 
     /// The parking types the model was trained for.
     fn kinds(&self) -> Vec<ParkingType>;

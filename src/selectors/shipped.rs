@@ -7,6 +7,7 @@ use std::path::Path;
 #[cfg(feature = "models")]
 pub static FILES: &[(&str, &[u8])] = &[
     ("knn.bin", include_bytes!("../../models/knn.bin")),
+    ("knn-angled.bin", include_bytes!("../../models/knn-angled.bin")),
     ("knn-tpcap.bin", include_bytes!("../../models/knn-tpcap.bin")),
     ("mlp-forward.safetensors", include_bytes!("../../models/mlp-forward.safetensors")),
     ("mlp-parallel.safetensors", include_bytes!("../../models/mlp-parallel.safetensors")),

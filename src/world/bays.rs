@@ -52,10 +52,11 @@ impl Unusual {
         }
     }
 
-    /// The types such a spot can be of; an oblique bay is nose in or tail in and has no type.
+    /// The types such a spot can be of; for an oblique bay they say whether the car stands nose in or
+    /// tail in, and its own type is [`ParkingType::Angled`].
     pub fn kinds(self) -> &'static [ParkingType] {
         match self {
-            Self::Kerbs | Self::Last => &ParkingType::ALL,
+            Self::Kerbs | Self::Last => &ParkingType::SQUARE,
             _ => &[ParkingType::Forward, ParkingType::Reverse],
         }
     }
@@ -167,7 +168,8 @@ impl Draw {
         let to = depth - from;
         let x = self.between(-beside, beside) * 0.7;
         let y = -self.between(from, to);
-        let goal = self.vehicle.rear_axle(Pose::new(x, y, kind.goal_heading()));
+        let heading = kind.goal_heading().expect("square to the lane or along it");
+        let goal = self.vehicle.rear_axle(Pose::new(x, y, heading));
         walls.push(box_of(-EXTENT, -depth - WALL, EXTENT, -depth));
         let mut blocked = None;
         let wall_side = if self.rng.random_bool(0.5) { 1.0 } else { -1.0 };

@@ -4,206 +4,27 @@
 //!
 //! Everything is laid out in the **spot frame**: origin at the spot's centre, +x along the
 //! lane in the direction of travel, +y from the spot toward the lane. The ego car stands anywhere in
-//! the lane, before the spot or beyond it, and heads along +x. With [`GeneratorConfig::world_frame`] the finished scene is put anywhere in
+//! the lane, before the spot or beyond it, and heads along +x. Angled bays (`angled`) are ours: the paper has none.
+//! With [`GeneratorConfig::world_frame`] the finished scene is put anywhere in
 //! the world, mirrored or not.
 //!
 //! A scene depends on its arguments alone: the same `(config, vehicle, kind, level, seed,
 //! index)` gives the same bytes on every thread and in any order.
 
-use std::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI};
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use serde::{Deserialize, Serialize};
 
 use super::{Level, ParkingType, Scene};
 use crate::geometry::{Aabb, Frame, Polygon, Pose, Vec2, segment_in_box};
 use crate::rng::{Stream, rng};
 use crate::vehicle::Vehicle;
 
-/// What one level of difficulty draws from.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LevelConfig {
-    /// W_spot of a bay, `[min, max]` metres.
-    pub bay_spot_width: [f64; 2],
-    /// W_spot of a parallel spot, `[min, max]` metres.
-    pub parallel_spot_width: [f64; 2],
-    /// Share of scenes with a wall across the lane.
-    pub dead_end_probability: f64,
-    /// D_deadend: from the spot's centre to the nearest point of that wall, `[min, max]`
-    /// metres.
-    pub dead_end: [f64; 2],
-}
+mod angled;
+mod config;
 
-/// What scenes are drawn from. The default is the paper's evaluation environment; what the
-/// paper leaves open is chosen here.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct GeneratorConfig {
-    /// The level `easy`.
-    pub easy: LevelConfig,
-    /// The level `complex`.
-    pub complex: LevelConfig,
-    /// The level `extreme`.
-    pub extreme: LevelConfig,
-    /// Width of the lane between the two rows, metres.
-    pub lane_width: f64,
-    /// Depth of a bay spot, metres.
-    pub bay_depth: f64,
-    /// Depth of a parallel spot, metres.
-    pub parallel_depth: f64,
-    /// Largest slant of a parked car, radians.
-    pub max_slant: f64,
-    /// Share of taken spots, drawn per row from `[min, max]`; the two neighbours of the
-    /// spot are always there.
-    pub occupancy: [f64; 2],
-    /// Share of scenes with a car standing in the lane, along its far side.
-    pub lane_car_probability: f64,
-    /// No car stands in the lane for x in `[-lane_clear.0, lane_clear.1]`, metres.
-    pub lane_clear: [f64; 2],
-    /// Room left beside a car in the lane, on top of the ego car's width, metres.
-    pub passing_room: f64,
-    /// Share of dead-end walls that are inclined.
-    pub incline_probability: f64,
-    /// Largest incline of a dead-end wall, radians from square to the lane.
-    pub max_incline: f64,
-    /// x of the start, `[min, max]` vehicle lengths, never beyond the dead end: the paper's ±N·l_car.
-    pub start_reach: [f64; 2],
-    /// The start heading lies within ± this, radians.
-    pub start_heading: f64,
-    /// Clearance of the start footprint from the lane's borders, metres.
-    pub start_lane_clearance: f64,
-    /// Clearance of the start footprint from every obstacle, metres.
-    pub start_clearance: f64,
-    /// Whether scenes lie at a random pose in the world, mirrored at random.
-    pub world_frame: bool,
-}
-
-impl Default for GeneratorConfig {
-    fn default() -> Self {
-        Self {
-            easy: LevelConfig {
-                bay_spot_width: [3.2, 4.2],
-                parallel_spot_width: [7.0, 8.0],
-                dead_end_probability: 0.5,
-                dead_end: [8.0, 12.0],
-            },
-            complex: LevelConfig {
-                bay_spot_width: [2.8, 3.7],
-                parallel_spot_width: [6.5, 7.5],
-                dead_end_probability: 1.0,
-                dead_end: [8.0, 12.0],
-            },
-            extreme: LevelConfig {
-                bay_spot_width: [2.3, 3.2],
-                parallel_spot_width: [6.0, 7.0],
-                dead_end_probability: 1.0,
-                dead_end: [4.0, 8.0],
-            },
-            lane_width: 6.0,
-            bay_depth: 5.5,
-            parallel_depth: 2.4,
-            max_slant: 3.0_f64.to_radians(),
-            occupancy: [0.5, 1.0],
-            lane_car_probability: 0.3,
-            lane_clear: [7.0, 9.0],
-            passing_room: 1.4,
-            incline_probability: 0.4,
-            max_incline: 15.0_f64.to_radians(),
-            start_reach: [-3.0, 3.0],
-            start_heading: FRAC_PI_6,
-            start_lane_clearance: 0.25,
-            start_clearance: 0.2,
-            world_frame: false,
-        }
-    }
-}
-
-/// A generator setting outside its range.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("generator.{field} is {value}; expected {expected}")]
-pub struct GeneratorError {
-    /// Name of the field.
-    pub field: String,
-    /// Its value.
-    pub value: String,
-    /// What would be right.
-    pub expected: String,
-}
-
-impl GeneratorConfig {
-    /// What `level` draws from.
-    pub fn level(&self, level: Level) -> &LevelConfig {
-        match level {
-            Level::Easy => &self.easy,
-            Level::Complex => &self.complex,
-            Level::Extreme => &self.extreme,
-        }
-    }
-
-    /// Depth of a spot, metres.
-    pub fn depth(&self, kind: ParkingType) -> f64 {
-        if kind.is_bay() { self.bay_depth } else { self.parallel_depth }
-    }
-
-    /// x of the start, `[min, max]` metres.
-    pub fn start_x(&self, vehicle: &Vehicle) -> [f64; 2] {
-        self.start_reach.map(|lengths| lengths * vehicle.length)
-    }
-
-    /// Checks every field, and that `vehicle` fits into the spots and the lane.
-    pub fn validate(&self, vehicle: &Vehicle) -> Result<(), GeneratorError> {
-        let number = |field: &str, v: f64, min: f64, max: f64| {
-            if (min..=max).contains(&v) {
-                return Ok(());
-            }
-            Err(GeneratorError {
-                field: field.to_owned(),
-                value: v.to_string(),
-                expected: format!("a number from {min:.4} to {max:.4}"),
-            })
-        };
-        let range = |field: &str, v: [f64; 2], min: f64, max: f64| {
-            if min <= v[0] && v[0] <= v[1] && v[1] <= max {
-                return Ok(());
-            }
-            Err(GeneratorError {
-                field: field.to_owned(),
-                value: format!("{v:?}"),
-                expected: format!("[low, high], both from {min:.4} to {max:.4}"),
-            })
-        };
-        let (length, width) = (vehicle.length, vehicle.width);
-        for level in Level::ALL {
-            let (name, l) = (level.name(), self.level(level));
-            let field = |f: &str| format!("{name}.{f}");
-            range(&field("bay_spot_width"), l.bay_spot_width, width + 0.1, 20.0)?;
-            range(&field("parallel_spot_width"), l.parallel_spot_width, length + 0.1, 40.0)?;
-            range(&field("dead_end"), l.dead_end, 0.5, EXTENT)?;
-            number(&field("dead_end_probability"), l.dead_end_probability, 0.0, 1.0)?;
-        }
-        let room = self.start_lane_clearance.max(0.0);
-        number("lane_width", self.lane_width, width + 2.0 * room + 0.1, 50.0)?;
-        number("bay_depth", self.bay_depth, length + 0.2, 50.0)?;
-        number("parallel_depth", self.parallel_depth, width + 0.2, 50.0)?;
-        number("max_slant", self.max_slant, 0.0, 0.2)?;
-        range("occupancy", self.occupancy, 0.0, 1.0)?;
-        number("lane_car_probability", self.lane_car_probability, 0.0, 1.0)?;
-        range("lane_clear", self.lane_clear, 0.0, EXTENT)?;
-        number("passing_room", self.passing_room, 2.0 * room, 50.0)?;
-        number("incline_probability", self.incline_probability, 0.0, 1.0)?;
-        number("max_incline", self.max_incline, 0.0, 0.8)?;
-        let farthest = EXTENT / length;
-        range("start_reach", self.start_reach, -farthest, farthest)?;
-        // Some stand before the spot: ahead of it there may be no room.
-        let nearest = -vehicle.front_extent() / length;
-        number("start_reach[0]", self.start_reach[0], -farthest, nearest)?;
-        number("start_heading", self.start_heading, 0.0, PI)?;
-        number("start_lane_clearance", self.start_lane_clearance, 0.0, 5.0)?;
-        number("start_clearance", self.start_clearance, 0.0, self.start_lane_clearance)
-    }
-}
+pub use config::{GeneratorConfig, GeneratorError, LevelConfig};
 
 /// How far scenes reach along the lane, metres to either side of the spot.
 const EXTENT: f64 = 20.0;
@@ -222,19 +43,24 @@ pub fn generate(
     seed: u64,
     index: u64,
 ) -> Scene {
-    let stream = index.wrapping_mul(9).wrapping_add(setting(kind, level));
+    let (stream, settings, setting) = setting(kind, level);
     let mut lot = Lot {
         config,
         vehicle,
-        rng: rng(seed, Stream::Scene, stream),
+        rng: rng(seed, stream, index.wrapping_mul(settings).wrapping_add(setting)),
         boundary: config.depth(kind) / 2.0,
+        mouth: 0.0,
         polygons: Vec::new(),
     };
-    let dead_end = lot.lay_out(kind, config.level(level));
+    let (heading, dead_end) = match kind.goal_heading() {
+        Some(heading) => (heading, lot.lay_out(kind, config.level(level))),
+        None => lot.lay_out_angled(config.level(level)),
+    };
     let start = lot.start(dead_end);
-    let goal = vehicle.rear_axle(Pose::new(0.0, 0.0, kind.goal_heading()));
-    let bounds = Aabb::new(-EXTENT, -lot.boundary, dead_end.unwrap_or(EXTENT), lot.top())
-        .inflated(2.0 * WALL);
+    let goal = vehicle.rear_axle(Pose::new(0.0, 0.0, heading));
+    // A slanted bay may reach farther than its lane.
+    let end = dead_end.filter(|_| kind != ParkingType::Angled).unwrap_or(EXTENT);
+    let bounds = Aabb::new(-EXTENT, -lot.boundary, end, lot.top()).inflated(2.0 * WALL);
     let frame = if config.world_frame { lot.somewhere() } else { Frame::WORLD };
     Scene {
         name: format!("{level}-{kind}-{index:04}"),
@@ -251,20 +77,22 @@ pub fn generate(
     }
 }
 
-/// The number of a type and level, 0 to 8, which picks the random stream of their scenes. Written
-/// out and part of the data format, like [`Stream`]: whoever changes it changes every scene.
-fn setting(kind: ParkingType, level: Level) -> u64 {
-    let kind = match kind {
-        ParkingType::Forward => 0,
-        ParkingType::Reverse => 3,
-        ParkingType::Parallel => 6,
+/// What picks the random stream of the scenes of a type and level: its name, the number of settings
+/// there, and that of this one. Written out and part of the data format, like [`Stream`]: whoever
+/// changes it changes every scene.
+fn setting(kind: ParkingType, level: Level) -> (Stream, u64, u64) {
+    let (stream, settings, kind) = match kind {
+        ParkingType::Forward => (Stream::Scene, 9, 0),
+        ParkingType::Reverse => (Stream::Scene, 9, 3),
+        ParkingType::Parallel => (Stream::Scene, 9, 6),
+        ParkingType::Angled => (Stream::Angled, 3, 0),
     };
     let level = match level {
         Level::Easy => 0,
         Level::Complex => 1,
         Level::Extreme => 2,
     };
-    kind + level
+    (stream, settings, kind + level)
 }
 
 /// A parking lot in the making, in the spot frame.
@@ -274,6 +102,8 @@ struct Lot<'a> {
     rng: ChaCha8Rng,
     /// y of the boundary between the spot's row and the lane.
     boundary: f64,
+    /// x of the middle of the spot's mouth.
+    mouth: f64,
     polygons: Vec<Polygon>,
 }
 
@@ -320,8 +150,15 @@ impl Lot<'_> {
             self.polygons.push(neighbour);
             self.fill(&row, next, side, side * end);
         }
-        let neighbour_end = self.polygons.iter().map(|p| p.aabb().max.x).fold(0.0, f64::max);
+        self.around_row(dead_end);
+        dead_end
+    }
 
+    /// Places what lies around the spot's row, whose cars are placed: the far side, the wall across the
+    /// lane at x = `dead_end`, the curbs, and a car in the lane.
+    fn around_row(&mut self, dead_end: Option<f64>) {
+        let row_end = dead_end.unwrap_or(EXTENT);
+        let neighbour_end = self.polygons.iter().map(|p| p.aabb().max.x).fold(0.0, f64::max);
         let behind = -self.boundary - self.between([0.0, 0.1]);
         let far_side = self.far_side(row_end);
         // The curbs end where the wall across the lane meets them.
@@ -337,7 +174,6 @@ impl Lot<'_> {
         if self.rng.random_bool(self.config.lane_car_probability) {
             self.lane_car(dead_end.is_none());
         }
-        dead_end
     }
 
     /// What lies across the lane, up to x = `end`: bays, parallel spots or nothing.
@@ -436,7 +272,7 @@ impl Lot<'_> {
         } else {
             -behind - extent.max.x - self.between([0.0, 6.0])
         };
-        self.polygons.push(moved(&car, Vec2::new(x, y)));
+        self.polygons.push(moved(&car, Vec2::new(self.mouth + x, y)));
     }
 
     /// A free start pose in the lane, on this side of the dead end.
@@ -517,11 +353,13 @@ mod tests {
     #[test]
     fn the_numbers_of_types_and_levels_stay_what_they_are() {
         let numbers = [
-            (ParkingType::Forward, [0, 1, 2]),
-            (ParkingType::Reverse, [3, 4, 5]),
-            (ParkingType::Parallel, [6, 7, 8]),
+            (ParkingType::Forward, Stream::Scene, 9, [0, 1, 2]),
+            (ParkingType::Reverse, Stream::Scene, 9, [3, 4, 5]),
+            (ParkingType::Parallel, Stream::Scene, 9, [6, 7, 8]),
+            (ParkingType::Angled, Stream::Angled, 3, [0, 1, 2]),
         ];
-        for (kind, expected) in numbers {
+        for (kind, stream, settings, numbers) in numbers {
+            let expected = numbers.map(|number| (stream, settings, number));
             assert_eq!(Level::ALL.map(|level| setting(kind, level)), expected, "{kind}");
         }
     }

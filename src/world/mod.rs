@@ -26,6 +26,6 @@ pub mod spot;
 pub mod tpcap;
 
 pub use goals::GoalTolerance;
-pub use kind::{Level, ParkingType, UnknownName};
+pub use kind::{Level, ParkingType, Stance, UnknownName};
 pub use obstacles::{ObstacleError, Obstacles};
 pub use scene::Scene;

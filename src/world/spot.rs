@@ -14,12 +14,15 @@
 //! with the scene leaves only its two directions to choose from.
 //!
 //! What looks like a lane may be no more than the room before slanted bays. It is one where no oblique
-//! direction leads farther than along it; oblique bays so have no type.
+//! direction leads farther than along it. Where so no usual spot fits, an angled bay is looked for
+//! (`angled`).
 
 use super::abstraction::{Abstraction, Surroundings, abstractions};
 use super::cell::{Axis, Grid};
-use super::{ObstacleError, Obstacles, ParkingType, Scene};
+use super::{ObstacleError, Obstacles, ParkingType, Scene, Stance};
 use crate::geometry::{Aabb, Frame, Pose, Vec2, segment_in_box};
+
+mod angled;
 
 /// How coordinates are taken into the planning frame.
 ///
@@ -68,8 +71,8 @@ fn round_to(v: f64, step: f64) -> f64 {
 pub struct SpotGuess {
     /// The spot frame in the world (the goal's own frame where no spot was found).
     pub frame: Frame,
-    /// The parking type, given or found.
-    pub kind: Option<ParkingType>,
+    /// The parking type, given or found, and how the parked car stands.
+    pub stance: Option<Stance>,
     /// The obstacles, seen from the frame.
     pub obstacles: Obstacles,
     /// How much farther from the parked centre the lane begins than beside a usual spot, metres;
@@ -77,33 +80,44 @@ pub struct SpotGuess {
     pub mouth: f64,
 }
 
+impl SpotGuess {
+    /// The parking type, given or found.
+    pub fn kind(&self) -> Option<ParkingType> {
+        self.stance.map(Stance::kind)
+    }
+}
+
 /// The planning frame of a scene.
 pub fn guess(scene: &Scene, precision: Precision) -> Result<SpotGuess, ObstacleError> {
-    let seen = |frame, kind, mouth| seen(scene, frame, kind, mouth, precision);
-    let Some(kind) = scene.parking_type else {
-        return match found(scene, &ParkingType::ALL, precision) {
-            Some(Found { frame, kind, mouth }) => seen(frame, Some(kind), mouth),
-            None => seen(goal_frame(scene), None, 0.0),
-        };
+    let seen = |frame, stance, mouth| seen(scene, frame, stance, mouth, precision);
+    let as_found = |Found { frame, stance, mouth, .. }| seen(frame, Some(stance), mouth);
+    let kind = match scene.parking_type {
+        None => {
+            return found(scene, &ParkingType::ALL, precision)
+                .map_or_else(|| seen(goal_frame(scene), None, 0.0), as_found);
+        }
+        Some(ParkingType::Angled) => {
+            return found(scene, &[ParkingType::Angled], precision)
+                .map_or_else(|| as_found(angled::told(scene)), as_found);
+        }
+        Some(kind) => kind,
     };
-    let usual = spot_frame(scene, kind);
-    let guess = seen(usual, Some(kind), 0.0)?;
+    let stance = Stance::new(kind, 0.0);
+    let usual = spot_frame(scene, stance);
+    let guess = seen(usual, Some(stance), 0.0)?;
     let grid = grid(scene);
-    if lane_is_open(&guess.obstacles, kind, &grid) {
+    if lane_is_open(&guess.obstacles, stance, &grid) {
         return Ok(guess);
     }
     if let Some(lane) = lane(&guess, &grid) {
         return Ok(SpotGuess { mouth: lane.shift, ..guess });
     }
     // The car may come from the other side, or stand across the lane.
-    let other = seen(other_way(&usual, kind), Some(kind), 0.0)?;
+    let other = seen(other_way(&usual, kind), Some(stance), 0.0)?;
     if let Some(lane) = lane(&other, &grid) {
         return Ok(SpotGuess { mouth: lane.shift, ..other });
     }
-    match found(scene, &[kind], precision) {
-        Some(Found { frame, mouth, .. }) => seen(frame, Some(kind), mouth),
-        None => Ok(guess),
-    }
+    found(scene, &[kind], precision).map_or(Ok(guess), as_found)
 }
 
 /// The usual spots and lanes, for the size of the vehicle.
@@ -144,9 +158,11 @@ fn goal_frame(scene: &Scene) -> Frame {
 #[derive(Clone, Copy)]
 struct Found {
     frame: Frame,
-    kind: ParkingType,
+    stance: Stance,
     /// See [`SpotGuess`].
     mouth: f64,
+    /// Area of the lane's cell.
+    size: f64,
 }
 
 /// How little may do for a spot beside a lane.
@@ -161,13 +177,25 @@ enum Demand {
 }
 
 /// The likeliest spot of one of `kinds`: the car stands in its lane rather than elsewhere, and the
-/// lane is large. Where there is a usual one, others do not count.
+/// lane is large. Where there is a usual one, others do not count. An angled one counts where none is
+/// usual, and any other's lane is clearly smaller.
 fn found(scene: &Scene, kinds: &[ParkingType], precision: Precision) -> Option<Found> {
     let near = around_goal(scene, precision);
-    [Demand::Usual, Demand::FartherOut, Demand::Least]
-        .into_iter()
-        .find_map(|demand| likeliest(scene, &near, kinds, demand))
+    let (angled, square): (Vec<_>, Vec<_>) = kinds.iter().partition(|k| **k == ParkingType::Angled);
+    let likeliest = |demand| likeliest(scene, &near, &square, demand);
+    if let Some(usual) = likeliest(Demand::Usual) {
+        return Some(usual);
+    }
+    let square = likeliest(Demand::FartherOut).or_else(|| likeliest(Demand::Least));
+    let angled = angled.first().and_then(|_| angled::found(scene, &near));
+    match (square, angled) {
+        (Some(square), Some(angled)) if angled.size > CLEARLY * square.size => Some(angled),
+        (square, angled) => square.or(angled),
+    }
 }
+
+/// An angled bay's lane must be so many times as large as that of an unusual square spot to count.
+const CLEARLY: f64 = 1.25;
 
 fn likeliest(
     scene: &Scene,
@@ -177,14 +205,16 @@ fn likeliest(
 ) -> Option<Found> {
     let of_kind = |&kind: &ParkingType| {
         let grid = if demand == Demand::Least { least_grid(scene, kind) } else { grid(scene) };
-        let usual = spot_frame(scene, kind);
+        let stance = Stance::new(kind, 0.0);
+        let usual = spot_frame(scene, stance);
         // The car may come from the other side, or stand across the lane.
         [usual, other_way(&usual, kind)].into_iter().find_map(|frame| {
             let seen = near.map(|p| from_parked(p, kind, frame.mirrored));
-            let lane = widest(&seen, kind, &grid, demand)?;
+            let lane = widest(&seen, stance, &grid, demand)?;
             let merit = merit(&lane, &grid, frame.local_from_world(scene.start));
             let is_lane = is_along(&seen, &lane, &grid, scene.vehicle.scale());
-            is_lane.then_some((merit, Found { frame, kind, mouth: lane.shift }))
+            let (_, size) = merit;
+            is_lane.then_some((merit, Found { frame, stance, mouth: lane.shift, size }))
         })
     };
     let mut best: Option<((bool, f64), Found)> = None;
@@ -197,14 +227,9 @@ fn likeliest(
 }
 
 /// The largest lane that will do.
-fn widest(
-    seen: &Surroundings,
-    kind: ParkingType,
-    grid: &Grid,
-    demand: Demand,
-) -> Option<Abstraction> {
-    let usual = || seen.lanes(kind, grid).first().copied();
-    let farther_out = || seen.lanes_farther_out(kind, grid).first().copied();
+fn widest(seen: &Surroundings, stance: Stance, grid: &Grid, demand: Demand) -> Option<Abstraction> {
+    let usual = || seen.lanes(stance, grid).first().copied();
+    let farther_out = || seen.lanes_farther_out(stance, grid).first().copied();
     match demand {
         Demand::Usual => usual(),
         Demand::FartherOut => farther_out(),
@@ -223,27 +248,28 @@ fn is_along(seen: &Surroundings, lane: &Abstraction, grid: &Grid, scale: f64) ->
     /// Half the width of an oblique ray, metres for the default vehicle: more than scanned points are
     /// apart.
     const RAY: f64 = 0.15;
-    let [area, _] = lane.regions(grid);
+    let area = area(lane, grid);
     let endless = ENDLESS * REACH * scale;
     // In nearly the whole width, as gaps between cars lead far, too.
     let edge = EDGE * (area.max.y - area.min.y);
-    let along = seen.free_in_band([area.min.y + edge, area.max.y - edge]);
+    let beside = area.min.x + grid.back;
+    let along = seen.free_in_band(beside, [area.min.y + edge, area.max.y - edge]);
     if along >= endless {
         return true;
     }
-    let middle = Vec2::new(0.0, f64::midpoint(area.min.y, area.max.y));
-    let free = |turn: f64, side: f64| {
+    let enough = along * SLACK;
+    if enough >= endless {
+        return true;
+    }
+    let middle = Vec2::new(beside, f64::midpoint(area.min.y, area.max.y));
+    let ends = |turn: f64, side: f64| {
         let (sin, cos) = turn.to_radians().sin_cos();
-        seen.free_along(middle, Vec2::new(cos * side, sin), RAY * scale, endless)
+        seen.ends_within(enough, middle, Vec2::new(cos * side, sin), RAY * scale)
     };
     // Both ways: what a gap lets see is seen on one side only.
-    let across = |side| move |turn: &f64| free(*turn, side).min(free(-turn, -side));
+    let ends_across = |side| move |turn: &f64| ends(*turn, side) || ends(-turn, -side);
     let oblique = [30.0, 37.5, 45.0, 52.5, 60.0];
-    let farthest = [1.0, -1.0]
-        .into_iter()
-        .flat_map(|side| oblique.iter().map(across(side)))
-        .fold(0.0, f64::max);
-    farthest <= along * SLACK
+    [1.0, -1.0].into_iter().all(|side| oblique.iter().all(ends_across(side)))
 }
 
 /// Obstacles within this of the parked centre are looked at, metres for the default vehicle: more
@@ -272,12 +298,12 @@ fn around_goal(scene: &Scene, precision: Precision) -> Surroundings {
 }
 
 /// A point given in the frame of [`around_goal`], seen from the spot frame of `kind` that is
-/// `mirrored` or not: quarter turns, which round nothing.
+/// `mirrored` or not: quarter turns, which round nothing. Angled bays: [`angled::from_parked`].
 fn from_parked(p: Vec2, kind: ParkingType, mirrored: bool) -> Vec2 {
     let plain = match kind {
-        ParkingType::Parallel => p,
         ParkingType::Forward => Vec2::new(p.y, -p.x),
         ParkingType::Reverse => Vec2::new(-p.y, p.x),
+        ParkingType::Parallel | ParkingType::Angled => p,
     };
     match (mirrored, kind.is_bay()) {
         (false, _) => plain,
@@ -289,25 +315,31 @@ fn from_parked(p: Vec2, kind: ParkingType, mirrored: bool) -> Vec2 {
 fn seen(
     scene: &Scene,
     frame: Frame,
-    kind: Option<ParkingType>,
+    stance: Option<Stance>,
     mouth: f64,
     precision: Precision,
 ) -> Result<SpotGuess, ObstacleError> {
     let view = frame.view();
     let obstacles = scene.geometry_by(|p| precision.point(view(p)))?;
-    Ok(SpotGuess { frame, kind, obstacles, mouth })
+    Ok(SpotGuess { frame, stance, obstacles, mouth })
 }
 
 /// The largest free lane beside the spot, if there is one.
 fn lane(guess: &SpotGuess, grid: &Grid) -> Option<Abstraction> {
-    abstractions(&guess.obstacles, guess.kind?, grid).first().copied()
+    abstractions(&guess.obstacles, guess.stance?, grid).first().copied()
+}
+
+/// The lane's rectangle in the spot frame; the frame of the cell is not turned here.
+fn area(lane: &Abstraction, grid: &Grid) -> Aabb {
+    let [area, _] = lane.regions(grid);
+    area.aabb()
 }
 
 /// Whether the car starts in the lane, and the lane's area.
 fn merit(lane: &Abstraction, grid: &Grid, start: Pose) -> (bool, f64) {
     // A car slightly out of its lane is in it.
     let slack = grid.lane_width.min / 4.0;
-    let [area, _] = lane.regions(grid);
+    let area = area(lane, grid);
     let in_lane =
         start.y > area.min.y - slack && start.y < area.min.y + lane.measured.lane_width + slack;
     let size = area.max - area.min;
@@ -316,8 +348,8 @@ fn merit(lane: &Abstraction, grid: &Grid, start: Pose) -> (bool, f64) {
 
 /// Whether nothing at all enters the smallest lane beside the spot: a quick answer for scenes
 /// where the given type is right.
-fn lane_is_open(obstacles: &Obstacles, kind: ParkingType, grid: &Grid) -> bool {
-    let boundary = grid.lane_boundary(kind);
+fn lane_is_open(obstacles: &Obstacles, stance: Stance, grid: &Grid) -> bool {
+    let boundary = grid.lane_boundary(stance);
     let top = boundary + grid.lane_width.min;
     let lane = Aabb::new(-grid.back, boundary, grid.dead_end.min, top);
     !obstacles.edges().any(|(a, b)| {
@@ -326,20 +358,25 @@ fn lane_is_open(obstacles: &Obstacles, kind: ParkingType, grid: &Grid) -> bool {
     })
 }
 
-/// The spot frame of a parking type, where the car comes from where it stands.
-fn spot_frame(scene: &Scene, kind: ParkingType) -> Frame {
-    let center = scene.vehicle.body_center(scene.goal);
-    // Right-handed first: the goal heading is `goal_heading` of the kind.
-    let x_heading = scene.goal.heading - kind.goal_heading();
-    let plain = Frame { origin_in_world: Pose { heading: x_heading, ..center }, mirrored: false };
+/// The spot frame of a car that stands so, where it comes from where it starts.
+fn spot_frame(scene: &Scene, stance: Stance) -> Frame {
+    let kind = stance.kind();
+    let plain = plain_frame(scene, stance);
     let start = plain.local_from_world(scene.start);
-    let mirrored = match kind {
+    let mirrored = match kind.is_bay() {
         // +x is the goal heading; the lane is on the side the car comes from.
-        ParkingType::Parallel => start.y < 0.0,
+        false => start.y < 0.0,
         // +y leads out of the bay; +x is the direction of travel.
-        ParkingType::Forward | ParkingType::Reverse => travels_backward_along_x(start),
+        true => travels_backward_along_x(start),
     };
     if mirrored { other_way(&plain, kind) } else { plain }
+}
+
+/// The right-handed frame from which the parked car stands so.
+fn plain_frame(scene: &Scene, stance: Stance) -> Frame {
+    let center = scene.vehicle.body_center(scene.goal);
+    let heading = scene.goal.heading - stance.heading();
+    Frame { origin_in_world: Pose { heading, ..center }, mirrored: false }
 }
 
 /// The frame of the other direction of travel: past a bay the other way, or on the other side of
@@ -399,18 +436,19 @@ mod tests {
     #[test]
     fn the_goal_is_parked_whatever_the_side() {
         let v = Vehicle::default();
-        for kind in ParkingType::ALL {
+        for kind in ParkingType::SQUARE {
+            let heading = Stance::new(kind, 0.0).heading();
             for turn in [0.0, 1.0, -2.5] {
                 for side in [1.0, -1.0] {
                     // A spot at the origin of a turned world, the lane on either side.
                     let world = Pose::new(3.0, -7.0, turn);
-                    let goal = v.rear_axle(Pose::new(0.0, 0.0, kind.goal_heading() * side));
+                    let goal = v.rear_axle(Pose::new(0.0, 0.0, heading * side));
                     let start = Pose::new(-9.0, 5.0 * side, 0.2 * side);
                     let scene = scene(kind, world.compose(start), world.compose(goal));
                     let g = guess(&scene, Precision::Given).unwrap();
                     assert_eq!(g.frame.mirrored, side < 0.0, "{kind} {turn} {side}");
                     let seen = g.frame.local_from_world(world.compose(goal));
-                    let expected = v.rear_axle(Pose::new(0.0, 0.0, kind.goal_heading()));
+                    let expected = v.rear_axle(Pose::new(0.0, 0.0, heading));
                     assert!(seen.distance(expected) < 1e-9, "{kind} {seen:?}");
                     assert!(signed_angle(seen.heading, expected.heading).abs() < 1e-9);
                     let center =

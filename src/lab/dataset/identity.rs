@@ -14,7 +14,7 @@ pub fn content_sha256<'a>(
     let mut hash = Sha256::new();
     hash.update(metadata.settings().to_string());
     let mut samples: Vec<&Sample> = samples.into_iter().collect();
-    samples.sort_by_key(|s| (s.cell.kind, s.cell_index, s.sample_index));
+    samples.sort_by_key(|s| (s.cell.kind(), s.cell_index, s.sample_index));
     let mut row = Vec::new();
     for sample in samples {
         row.clear();
@@ -30,7 +30,7 @@ fn write(s: &Sample, row: &mut Vec<u8>) {
         row.extend((text.len() as u32).to_le_bytes());
         row.extend(text.as_bytes());
     };
-    text(row, s.cell.kind.name());
+    text(row, s.cell.kind().name());
     text(row, s.status.name());
     text(row, &s.rs_word);
     text(row, &manoeuvre_text(&s.manoeuvre));

@@ -157,13 +157,13 @@ impl Dataset {
 
     /// The checksum that names the rows of these types, [`content_sha256`].
     pub fn content_sha256(&self, kinds: &[ParkingType]) -> String {
-        let of_kinds = self.samples.iter().filter(|s| kinds.contains(&s.cell.kind));
+        let of_kinds = self.samples.iter().filter(|s| kinds.contains(&s.cell.kind()));
         content_sha256(&self.metadata, of_kinds)
     }
 
     /// The parking types that have rows.
     pub fn kinds(&self) -> Vec<ParkingType> {
-        let held = |kind: &ParkingType| self.samples.iter().any(|s| s.cell.kind == *kind);
+        let held = |kind: &ParkingType| self.samples.iter().any(|s| s.cell.kind() == *kind);
         ParkingType::ALL.into_iter().filter(held).collect()
     }
 

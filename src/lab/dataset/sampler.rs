@@ -64,7 +64,7 @@ impl<'a> Sampler<'a> {
     /// The sample `sample_index` of the cell `cell_index`.
     pub fn sample(&mut self, kind: ParkingType, cell_index: u32, sample_index: u32) -> Sample {
         let config = self.config;
-        let known = self.current.take().filter(|c| c.index == cell_index && c.cell.kind == kind);
+        let known = self.current.take().filter(|c| c.index == cell_index && c.cell.kind() == kind);
         let mut here = known.unwrap_or_else(|| CellProblem::new(config, kind, cell_index));
         // The probes are solved whichever sample is asked for first, so that a sample does
         // not depend on that.
@@ -87,7 +87,7 @@ impl<'a> Sampler<'a> {
 
     fn solve(&mut self, here: &mut CellProblem, sample_index: u32) -> Sample {
         let config = self.config;
-        let (kind, cell_index) = (here.cell.kind, here.index);
+        let (kind, cell_index) = (here.cell.kind(), here.index);
         let unsolved = |start, status| {
             Sample::unsolved(here.cell, cell_index, sample_index, start, status, config.seed)
         };
@@ -97,7 +97,7 @@ impl<'a> Sampler<'a> {
             return no_start;
         };
         let mut rng = rng(config.seed, Stream::Start, stream_index(kind, cell_index, sample_index));
-        let [lane, _] = config.grid_with_lane_behind().regions(&here.cell);
+        let lane = config.grid_with_lane_behind().lane(&here.cell);
         let Some(start) = (0..MAX_DRAWS)
             .map(|_| draw(&mut rng, &lane, config.start_heading_max))
             .find(|pose| problem.collision.pose_is_free(*pose))
@@ -128,7 +128,7 @@ impl CellProblem {
     fn new(config: &CollectConfig, kind: ParkingType, index: u32) -> Self {
         let cell = config.grid.cell(kind, index as usize);
         // The goal stands in as start: with it, only a spot too narrow for the car fails.
-        let goal = config.grid.goal(kind, &config.vehicle);
+        let goal = config.grid.goal(cell.stance, &config.vehicle);
         let problem = |grid: &Grid| Problem::in_cell(grid, &cell, config.vehicle, goal).ok();
         let (own, longer) = (problem(&config.grid), problem(&config.grid_with_lane_behind()));
         let problems =
@@ -144,6 +144,7 @@ fn stream_index(kind: ParkingType, cell_index: u32, sample_index: u32) -> u64 {
         ParkingType::Forward => 0,
         ParkingType::Parallel => 1,
         ParkingType::Reverse => 2,
+        ParkingType::Angled => 3,
     };
     kind << 62 | u64::from(cell_index) << 32 | u64::from(sample_index)
 }
@@ -199,7 +200,7 @@ mod tests {
         }
         all.sort_unstable();
         all.dedup();
-        assert_eq!(all.len(), 27);
+        assert_eq!(all.len(), 36);
     }
 
     #[test]

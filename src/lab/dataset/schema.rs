@@ -316,9 +316,12 @@ pub struct Difference {
 pub(super) fn first_difference(field: &str, stored: &Value, current: &Value) -> Option<Difference> {
     if let (Value::Object(a), Value::Object(b)) = (stored, current) {
         let missing = Value::Null;
-        return a.iter().find_map(|(key, value)| {
+        // What is usual may be left out of either.
+        let keys = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
+        return keys.into_iter().find_map(|key| {
             let name = if field.is_empty() { key.clone() } else { format!("{field}.{key}") };
-            first_difference(&name, value, b.get(key).unwrap_or(&missing))
+            let [stored, current] = [a, b].map(|of| of.get(key).unwrap_or(&missing));
+            first_difference(&name, stored, current)
         });
     }
     (stored != current).then(|| Difference {

@@ -69,9 +69,10 @@ impl Subset {
         metadata.samples_per_cell = metadata.samples_per_cell.min(self.samples_per_cell);
         let kept = data.samples.iter().filter(|s| s.sample_index < metadata.samples_per_cell);
         let moved = kept.filter_map(|sample| {
-            let kind = sample.cell.kind;
+            let kind = sample.cell.kind();
             let place = old.place(kind, sample.cell_index as usize);
-            let every = [self.lane_width, self.spot_width, self.dead_end];
+            // Of all stances of angled bays.
+            let every = [1, self.lane_width, self.spot_width, self.dead_end];
             if place.iter().zip(every).any(|(index, every)| index % every != 0) {
                 return None;
             }

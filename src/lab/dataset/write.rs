@@ -67,7 +67,7 @@ fn arrays(samples: &[Sample]) -> Vec<ArrayRef> {
         Arc::new(Float32Array::from_iter_values(samples.iter().map(|s| f(s) as f32)))
     };
     vec![
-        text(&|s| s.cell.kind.name()),
+        text(&|s| s.cell.kind().name()),
         small(&|s| s.cell_index),
         small(&|s| s.sample_index),
         double(&|s| s.cell.lane_width),

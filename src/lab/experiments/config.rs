@@ -191,7 +191,7 @@ impl EvaluateConfig {
 }
 
 fn all_types() -> Vec<ParkingType> {
-    ParkingType::ALL.to_vec()
+    ParkingType::SQUARE.to_vec()
 }
 
 fn home() -> Vec<World> {

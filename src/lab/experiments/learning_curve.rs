@@ -27,7 +27,7 @@ pub(super) fn points(
     let knn = folder.join("knn.bin");
     // What data alone is worth.
     let no_worlds = WorldsConfig { count: 0, ..config.train.knn };
-    training::knn::train(&part.metadata, &part.samples, kinds, &no_worlds, &knn)?;
+    training::knn::train(&part.metadata, &part.samples, kinds, &no_worlds.into(), &knn)?;
     let mut files = vec![knn];
     if curve.needs_mlp() {
         for &kind in kinds {
@@ -50,7 +50,7 @@ pub(super) fn points(
     bar.finish_and_clear();
     let mut points = Vec::new();
     for &kind in kinds {
-        let solved = part.solved().filter(|s| s.cell.kind == kind).count();
+        let solved = part.solved().filter(|s| s.cell.kind() == kind).count();
         let from = Part {
             grid: &part.metadata.grid,
             samples_per_cell: part.metadata.samples_per_cell,

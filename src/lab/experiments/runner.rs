@@ -296,7 +296,8 @@ impl Runner<'_> {
         let knn_settings = settings(("knn", data, config));
         if self.stages.begin("train-knn", &knn_settings, knn.exists())? != Todo::Nothing {
             let set = self.dataset(read)?;
-            training::knn::train(&set.metadata, &set.samples, kinds, config, &knn)?;
+            let config = config.to_owned().into();
+            training::knn::train(&set.metadata, &set.samples, kinds, &config, &knn)?;
             self.stages.finish("train-knn", &knn_settings)?;
         }
         if !self.config.needs_mlp() {

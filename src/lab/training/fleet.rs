@@ -21,7 +21,7 @@ use crate::selectors::fleet::{self, FleetHeader, Scaling, UNIT_LAYERS, UnitManoe
 use crate::selectors::network::{LayerWeights, OUTPUTS, outputs_from_pose};
 use crate::selectors::{Features, Normaliser, UNIT_COUNT, UNIT_NAMES};
 use crate::vehicle::Vehicle;
-use crate::world::ParkingType;
+use crate::world::{ParkingType, Stance};
 
 /// The training's log, written as JSON beside the model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -78,12 +78,12 @@ pub fn train(
     config.validate()?;
     worlds.validate()?;
     let mut solved = Vec::new();
-    for kind in ParkingType::ALL {
+    for kind in ParkingType::SQUARE {
         solved.push((kind, solved_of(sets, kind)?));
     }
     let condensed = worlds.learn(&solved, |(kind, of_sets), worlds| {
         let sources = sources(sets, of_sets);
-        worlds.learn(*kind, condense(*kind, &sources), &sources)
+        worlds.learn(Stance::new(*kind, 0.0), condense(&sources), &sources)
     });
     let (mut scaling, mut networks, mut logs) = (Vec::new(), Vec::new(), Vec::new());
     for ((kind, of_sets), manoeuvres) in solved.iter().zip(&condensed) {
@@ -93,11 +93,11 @@ pub fn train(
         logs.push(learnt.log);
     }
     let count = |m: &UnitManoeuvres| m.iter().map(Vec::len).sum();
-    let kinds = ParkingType::ALL.into_iter().zip(&condensed);
+    let kinds = ParkingType::SQUARE.into_iter().zip(&condensed);
     let header = FleetHeader {
         format_version: fleet::VERSION,
         fleet: sets.iter().map(|s| s.metadata.vehicle).collect(),
-        data_sha256: sets.iter().map(|s| s.content_sha256(&ParkingType::ALL)).collect(),
+        data_sha256: sets.iter().map(|s| s.content_sha256(&ParkingType::SQUARE)).collect(),
         kinds: kinds.map(|(kind, m)| (kind, m.len(), count(m))).collect(),
         grid: sets[0].metadata.grid,
         features: UNIT_NAMES.map(str::to_owned).to_vec(),

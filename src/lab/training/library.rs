@@ -14,7 +14,7 @@ use crate::planners::library::{Library, LibrarySearch, Verdicts};
 use crate::planners::{HybridAStar, Problem};
 use crate::selectors::fleet::scaled;
 use crate::vehicle::Vehicle;
-use crate::world::ParkingType;
+use crate::world::cell::Cell;
 use crate::world::collision::BodyFrame;
 
 /// A plan that costs at most this much more than a sample's own serves it.
@@ -28,7 +28,7 @@ const MOST_TRIES_PER_USE: usize = 20;
 /// are taken.
 const MOST_SAMPLES: usize = 10_000;
 
-/// Solved samples of one vehicle and parking type, ordered by cell.
+/// Solved samples of one vehicle and one way to stand parked, ordered by cell.
 pub(super) struct Source<'a> {
     /// Of the data set they belong to.
     pub metadata: &'a Metadata,
@@ -53,8 +53,8 @@ impl Source<'_> {
     }
 }
 
-/// Manoeuvres for spots of type `kind` that serve all `sources`, in their units.
-pub(super) fn condense(kind: ParkingType, sources: &[Source]) -> Vec<Vec<Segment>> {
+/// Manoeuvres that serve all `sources`, in their units.
+pub(super) fn condense(sources: &[Source]) -> Vec<Vec<Segment>> {
     let mut search = LibrarySearch::default();
     let mut manoeuvres = Vec::new();
     let mut verdicts_of = Vec::new();
@@ -64,7 +64,7 @@ pub(super) fn condense(kind: ParkingType, sources: &[Source]) -> Vec<Vec<Segment
         let mut library = source.library(&manoeuvres);
         let taken = spread(source.solved, *manoeuvres_per_cell);
         let mut cells = Vec::new();
-        for_each_cell(source.metadata, kind, &taken, |problem, samples| {
+        for_each_cell(source.metadata, &taken, |problem, samples| {
             let mut verdicts = Verdicts::default();
             for sample in samples {
                 problem.start = sample.start;
@@ -89,7 +89,7 @@ pub(super) fn condense(kind: ParkingType, sources: &[Source]) -> Vec<Vec<Segment
         let library = source.library(&manoeuvres);
         let taken = spread(source.solved, *manoeuvres_per_cell);
         let mut cells = cells.into_iter();
-        for_each_cell(source.metadata, kind, &taken, |problem, samples| {
+        for_each_cell(source.metadata, &taken, |problem, samples| {
             let mut verdicts = cells.next().expect("the same cells");
             for sample in samples {
                 problem.start = sample.start;
@@ -137,17 +137,17 @@ fn spread<'a>(solved: &[&'a Sample], per_cell: u32) -> Vec<&'a Sample> {
 /// nearer to the walls than the planners' margin are left out.
 fn for_each_cell(
     metadata: &Metadata,
-    kind: ParkingType,
     samples: &[&Sample],
     mut each: impl FnMut(&mut Problem, &[&Sample]),
 ) {
     let Metadata { vehicle, grid, .. } = metadata;
     let footprint = vehicle.footprint(Problem::usual_margin(vehicle));
-    let goal = grid.goal(kind, vehicle);
-    let grid = grid.with_lane_behind(metadata.start_behind);
+    let goal = |cell: &Cell| grid.goal(cell.stance, vehicle);
+    let longer = grid.with_lane_behind(metadata.start_behind);
     for of_cell in samples.chunk_by(|a, b| a.cell_index == b.cell_index) {
+        let cell = &of_cell[0].cell;
         // The goal stands in as start.
-        let Ok(mut problem) = Problem::in_cell(&grid, &of_cell[0].cell, *vehicle, goal) else {
+        let Ok(mut problem) = Problem::in_cell(&longer, cell, *vehicle, goal(cell)) else {
             continue;
         };
         if *problem.collision.footprint() != footprint {
@@ -173,7 +173,7 @@ fn ending(
     goal.add_preparatory(begin, known.clone(), vehicle, &model);
     let leg = hars.direct(problem, problem.start, &goal.only_preparatory()?)?;
     let known_length = known.iter().map(|s| s.length.abs()).sum::<f64>() - 1e-6;
-    let boundary = metadata.grid.lane_boundary(sample.cell.kind);
+    let boundary = metadata.grid.lane_boundary(sample.cell.stance);
     let footprint = problem.collision.footprint();
     Some((outside(&leg.path, known_length, boundary, footprint), leg.cost))
 }

@@ -83,7 +83,7 @@ pub fn train(
         layers: LAYERS.to_vec(),
         input: Normaliser::fit(&raw_inputs),
         output: Normaliser::fit(&raw_outputs),
-        data_sha256: content_sha256(metadata, samples.iter().filter(|s| s.cell.kind == kind)),
+        data_sha256: content_sha256(metadata, samples.iter().filter(|s| s.cell.kind() == kind)),
         seed: config.seed,
         training: serde_json::to_value(config).expect("settings are plain data"),
         crate_version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -108,7 +108,7 @@ pub fn train(
         validation: errors(&first, &validation),
         reach: reach(metadata, &validation, &first),
     };
-    let rows = samples.iter().filter(|s| s.cell.kind == kind).count();
+    let rows = samples.iter().filter(|s| s.cell.kind() == kind).count();
     let losses = fit(&model, &train, &validation_rows, config, kind.name(), |losses| {
         log.losses = losses.to_vec();
         log.best_epoch = losses.len();

@@ -178,7 +178,7 @@ fn solved(
     kind: ParkingType,
     cells: usize,
 ) -> Result<Vec<&Sample>, TrainingError> {
-    let wanted = |s: &&Sample| s.cell.kind == kind && s.status == Status::Solved;
+    let wanted = |s: &&Sample| s.cell.kind() == kind && s.status == Status::Solved;
     let mut solved: Vec<&Sample> = samples.iter().filter(wanted).collect();
     solved.sort_by_key(|s| (s.cell_index, s.sample_index));
     for s in &solved {

@@ -158,12 +158,12 @@ impl CellWorld {
     /// `None` where the car does not fit the spot.
     pub fn new(metadata: &Metadata, cell: &Cell, behind: f64) -> Option<Self> {
         let Metadata { grid, vehicle, .. } = metadata;
-        let parked = grid.goal(cell.kind, vehicle);
+        let parked = grid.goal(cell.stance, vehicle);
         // Beyond the draws there is room for the car's rear.
         let longer = Grid { back: grid.back + behind + vehicle.length, ..*grid };
         let problem = |grid: &Grid| Problem::in_cell(grid, cell, *vehicle, parked).ok();
         let (cell_problem, behind_problem) = (problem(grid)?, problem(&longer)?);
-        let [lane, _] = grid.regions(cell);
+        let lane = grid.lane(cell);
         let lane_behind =
             Aabb::new(lane.min.x - behind, lane.min.y, lane.min.x.min(parked.x), lane.max.y);
         let goal = HybridAStar::new(metadata.planner).goal_set(&cell_problem);
@@ -271,7 +271,7 @@ impl Choice<'_> {
         let group_of: HashMap<u32, usize> =
             self.groups.iter().enumerate().map(|(i, g)| (g[0].cell_index, i)).collect();
         let steps = (self.groups.len() * (1 + RADII.len())) as u64;
-        let bar = progress::bar(steps, self.groups[0][0].cell.kind.name());
+        let bar = progress::bar(steps, self.groups[0][0].cell.kind().name());
         bar.set_message("one pose per cell");
         let mut chosen = self.each(&bar, |i, judge| {
             let group = self.groups[i];
@@ -388,9 +388,9 @@ fn around(pose: Pose, radius: f64, rng: &mut ChaCha8Rng) -> Pose {
     Pose::new(x, y, wrap_angle(pose.heading + off() / LEVER))
 }
 
-/// Indices of the up to six cells one step of the grid away.
+/// Indices of the up to six cells one step of the grid away, where the parked car stands alike.
 fn neighbours(grid: &Grid, cell: &Cell, index: u32) -> impl Iterator<Item = u32> {
-    let sizes = [grid.dead_end.len(), grid.spot_width(cell.kind).len(), grid.lane_width.len()];
+    let sizes = [grid.dead_end.len(), grid.spot_width(cell.kind()).len(), grid.lane_width.len()];
     let strides = [1, sizes[0], sizes[0] * sizes[1]];
     let index = index as usize;
     (0..3).flat_map(move |axis| {

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::library::Source;
 use super::{TrainingError, settings};
 use crate::curves::Segment;
+use crate::geometry::signed_angle;
 use crate::lab::dataset::Metadata;
 use crate::lab::progress;
 use crate::planners::cost::CostModel;
@@ -22,7 +23,7 @@ use crate::rng::{Stream, rng};
 use crate::selectors::fleet::scaled;
 use crate::vehicle::Vehicle;
 use crate::world::generate::{GeneratorConfig, LevelConfig, generate};
-use crate::world::{Level, ParkingType};
+use crate::world::{Level, ParkingType, Scene, Stance};
 
 /// A plan that costs at most so many times the teacher's will do.
 const GOOD: f64 = 1.05;
@@ -80,12 +81,12 @@ pub(super) struct Worlds<'a> {
 }
 
 impl Worlds<'_> {
-    /// What is worth knowing of `manoeuvres` and of those of these worlds for spots of type `kind`, in
-    /// the units of the `sources`; what is used most comes first. The worlds are divided among the
+    /// What is worth knowing of `manoeuvres` and of those of these worlds for spots in which the car stands
+    /// so, in the units of the `sources`; what is used most comes first. The worlds are divided among the
     /// sources' vehicles. Without a world all stays as it is.
     pub fn learn(
         &self,
-        kind: ParkingType,
+        stance: Stance,
         mut manoeuvres: Vec<Vec<Segment>>,
         sources: &[Source],
     ) -> Vec<Vec<Segment>> {
@@ -93,7 +94,7 @@ impl Worlds<'_> {
             return manoeuvres;
         }
         let mut pupils: Vec<Pupil> = sources.iter().map(|s| Pupil::new(s, &manoeuvres)).collect();
-        self.for_each(kind, sources, |at, problem| {
+        self.for_each(stance, sources, |at, problem| {
             if let Some(learnt) = pupils[at].lesson(problem) {
                 let learnt = scaled(&learnt, 1.0 / sources[at].unit);
                 for (pupil, source) in pupils.iter_mut().zip(sources) {
@@ -103,7 +104,7 @@ impl Worlds<'_> {
             }
         });
         let mut uses = vec![0_u32; manoeuvres.len()];
-        self.for_each(kind, sources, |at, problem| {
+        self.for_each(stance, sources, |at, problem| {
             if let Some(used) = pupils[at].used(problem) {
                 uses[used] += 1;
             }
@@ -113,36 +114,42 @@ impl Worlds<'_> {
         order.into_iter().map(|i| std::mem::take(&mut manoeuvres[i])).collect()
     }
 
-    /// Calls `each` with the number of a source and a world for its vehicle, turn by turn.
-    fn for_each(
-        &self,
-        kind: ParkingType,
-        sources: &[Source],
-        mut each: impl FnMut(usize, &Problem),
-    ) {
+    /// Calls `each` with the number of a source and a world for its vehicle, turn by turn. An angled bay's
+    /// is a world of the stance of the grid that is nearest.
+    fn for_each(&self, stance: Stance, sources: &[Source], mut each: impl FnMut(usize, &Problem)) {
         for index in 0..self.config.count {
-            self.progress.inc(1);
             let at = index as usize % sources.len();
-            if let Some(problem) = self.world(&sources[at].metadata.vehicle, kind, index) {
+            let Metadata { vehicle, grid, .. } = sources[at].metadata;
+            let scene = self.world(vehicle, stance.kind(), index);
+            let apart =
+                |scene: &Scene, s: Stance| signed_angle(scene.goal.heading, s.heading()).abs();
+            let of = grid.stances(stance.kind());
+            let is_other =
+                |scene: &Scene| of.iter().any(|&other| apart(scene, other) < apart(scene, stance));
+            if scene.as_ref().is_some_and(is_other) {
+                continue;
+            }
+            self.progress.inc(1);
+            if let Some(problem) = scene.and_then(|scene| Problem::new(&scene).ok()) {
                 each(at, &problem);
             }
         }
     }
 
-    /// The world of a number; `None` where its sizes leave no room for the vehicle.
-    fn world(&self, vehicle: &Vehicle, kind: ParkingType, index: u32) -> Option<Problem> {
+    /// The world of a number, in the spot frame; `None` where its sizes leave no room for the vehicle.
+    fn world(&self, vehicle: &Vehicle, kind: ParkingType, index: u32) -> Option<Scene> {
         // Which of the random streams it is: part of what models are made of, so never renumbered.
         let number = match kind {
             ParkingType::Forward => 0,
             ParkingType::Parallel => 1,
             ParkingType::Reverse => 2,
+            ParkingType::Angled => 3,
         };
         let mut rng = rng(self.config.seed, Stream::World, u64::from(index) << 8 | number);
         let mut between = |min: f64, max: f64| rng.random_range(min..=max);
         let config = drawn(vehicle, &mut between);
         config.validate(vehicle).ok()?;
-        let scene = generate(&config, vehicle, kind, Level::Complex, rng.random(), 0);
-        Problem::new(&scene).ok()
+        Some(generate(&config, vehicle, kind, Level::Complex, rng.random(), 0))
     }
 }
 

@@ -6,12 +6,13 @@ use crate::planners::cost::CostModel;
 use crate::planners::hybrid_astar::{GoalSet, HybridAStar, Leg};
 use crate::planners::library::{Library, LibraryPlan};
 use crate::planners::{Effort, Guidance, Problem, Route};
-use crate::world::ParkingType;
 use crate::world::abstraction::abstractions;
 use crate::world::cell::Grid;
+use crate::world::{ParkingType, Stance};
 
-/// Libraries kept prepared: those of the parking types of two vehicles, or of one with two margins.
-const LIBRARIES: usize = 6;
+/// Libraries kept prepared: those of the parking types of two vehicles, or of one with two margins,
+/// and of some slants.
+const LIBRARIES: usize = 12;
 /// The first so many manoeuvres of a library, those of most use, are looked at for every plan, the others
 /// where these do not do as usual.
 const COMMON: usize = 400;
@@ -38,9 +39,9 @@ const DEEPER: f64 = 0.3;
 /// Those that it tries to join by a long way round, where no other plan was found.
 const LONG_WAYS: usize = 8;
 
-/// A library made ready for a parking type and a footprint.
+/// A library made ready for a way to stand parked and a footprint.
 pub(super) struct Prepared {
-    kind: ParkingType,
+    stance: Stance,
     library: Library,
     /// From this number on its manoeuvres are none but the straight into the spot, or nothing at
     /// all: what joins them is the curve straight to the goal.
@@ -52,7 +53,7 @@ pub(super) struct Prepared {
 impl Prepared {
     /// Whether it was made ready for such problems.
     fn serves(&self, problem: &Problem) -> bool {
-        problem.kind == Some(self.kind) && self.library.fits(problem)
+        problem.stance() == Some(self.stance) && self.library.fits(problem)
     }
 }
 
@@ -81,12 +82,12 @@ impl<'a> Standard<'a> {
     pub(super) fn is_unusual(&mut self) -> bool {
         let problem = self.problem;
         let scale = problem.vehicle.scale();
-        let has_cell = |kind| {
+        let has_cell = |stance| {
             let grid = Grid::default().scaled(scale);
-            !abstractions(&problem.obstacles, kind, &grid).is_empty()
+            !abstractions(&problem.obstacles, stance, &grid).is_empty()
         };
-        let unusual = |kind| problem.mouth > DEEPER * scale || !has_cell(kind);
-        *self.unusual.get_or_insert_with(|| problem.kind.is_some_and(unusual))
+        let unusual = |stance| problem.mouth > DEEPER * scale || !has_cell(stance);
+        *self.unusual.get_or_insert_with(|| problem.stance().is_some_and(unusual))
     }
 }
 
@@ -206,12 +207,12 @@ impl GuidedPlanner {
 
     /// Puts the library for `problem` first, prepared if need be, and says whether there is one.
     pub(super) fn prepare_library(&mut self, problem: &Problem) -> bool {
-        let Some(kind) = problem.kind else { return false };
+        let Some(stance) = problem.stance() else { return false };
         match self.libraries.iter().position(|p| p.serves(problem)) {
             Some(at) => self.libraries[..=at].rotate_right(1),
             None => {
                 let (vehicle, footprint) = (&problem.vehicle, *problem.collision.footprint());
-                let manoeuvres = self.selector.manoeuvres(kind, vehicle);
+                let manoeuvres = self.selector.manoeuvres(stance, vehicle);
                 let cost = self.hars.cost(vehicle);
                 let (common, rare) = manoeuvres.split_at(COMMON.min(manoeuvres.len()));
                 let prepared = |all| Library::new(all, vehicle, footprint, &cost);
@@ -221,7 +222,7 @@ impl GuidedPlanner {
                     library.add(entry, &cost);
                 }
                 self.libraries.truncate(LIBRARIES - 1);
-                self.libraries.insert(0, Prepared { kind, library, straights, rare });
+                self.libraries.insert(0, Prepared { stance, library, straights, rare });
             }
         }
         self.libraries[0].straights > 0

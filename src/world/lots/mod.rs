@@ -82,6 +82,7 @@ fn number(kind: ParkingType) -> u64 {
         ParkingType::Forward => 0,
         ParkingType::Reverse => 1,
         ParkingType::Parallel => 2,
+        ParkingType::Angled => 3,
     }
 }
 
@@ -143,7 +144,7 @@ mod tests {
             }
         }
         let numbers = ParkingType::ALL.map(number);
-        assert_eq!(numbers, [0, 2, 1], "{:?}", ParkingType::ALL);
+        assert_eq!(numbers, [0, 2, 1, 3], "{:?}", ParkingType::ALL);
     }
 
     /// By the planner's own check, which the generator does not use.

@@ -66,6 +66,9 @@ impl Park {
             // To turn round there is rarely the room.
             ParkingType::Parallel => Some(goal.heading.cos() > 0.0),
             ParkingType::Forward | ParkingType::Reverse => None,
+            // Tail in one passes the bay first, nose in one comes from where it opens to; now and then
+            // from the other side.
+            ParkingType::Angled => Some((goal.heading.cos() > 0.0) != draw.chance(0.25)),
         };
         let start = plan.start(ends, along, draw, &things)?;
         let stations = [-16.0, -8.0, 0.0, 8.0, 16.0].into_iter();
@@ -82,6 +85,7 @@ impl<'a> Plan<'a> {
         let style = match kind {
             ParkingType::Forward | ParkingType::Reverse => Style::SQUARE,
             ParkingType::Parallel => Style::Parallel,
+            ParkingType::Angled => Style::Bays { slant: draw.between(FRAC_PI_6, 1.3) },
         };
         let is_street = draw.chance(if style == Style::Parallel { 0.6 } else { 0.15 });
         let bends = if style == Style::Parallel { 0.45 } else { 0.1 };
@@ -97,7 +101,8 @@ impl<'a> Plan<'a> {
         };
         let lane = draw.between(4.0, 9.0);
         let needed = match kind {
-            ParkingType::Reverse => lane_to_back_into(vehicle, width),
+            // More than most angled bays ask for.
+            ParkingType::Reverse | ParkingType::Angled => lane_to_back_into(vehicle, width),
             // Nose in the car swings out at its front: it needs more, or more moves.
             ParkingType::Forward => lane_to_back_into(vehicle, width) + 0.5,
             ParkingType::Parallel => vehicle.width + 2.0,
@@ -251,7 +256,7 @@ impl<'a> Plan<'a> {
         let turn = match kind {
             ParkingType::Forward => PI,
             ParkingType::Reverse => 0.0,
-            ParkingType::Parallel => f64::from(draw.number(0..2)) * PI,
+            ParkingType::Parallel | ParkingType::Angled => f64::from(draw.number(0..2)) * PI,
         };
         let error = if draw.chance(0.7) { draw.about(PI / 180.0) } else { 0.0 };
         // From the spot's middle: in the direction in which there is room to choose, and across it.

@@ -13,7 +13,8 @@ pub(in crate::lab::training) fn knn(out: &Path, metadata: &Metadata, log: &KnnLo
     let (bytes, mebibytes) = (log.bytes, log.bytes as f64 / f64::from(1 << 20));
     let kinds: Vec<&str> = log.kinds.iter().map(|k| spots(k.kind)).collect();
     let spots = kinds.join(", ");
-    let rows: Vec<_> = log.kinds.iter().map(|k| (k.kind, k.rows, k.samples)).collect();
+    let solved = |k: &KnnKindLog| k.solved.unwrap_or(k.samples);
+    let rows: Vec<_> = log.kinds.iter().map(|k| (k.kind, k.rows, solved(k))).collect();
     let data = data(metadata, &log.data_sha256, &rows);
     let radius = log.heading_radius;
     let mut stored = String::new();

@@ -57,6 +57,17 @@ fn data(metadata: &Metadata, sha256: &str, rows: &[(ParkingType, usize, usize)])
         depths.push(format!("{spots} are {} m deep", number(m.grid.depth(*kind))));
     }
     axis("dead end", &m.grid.dead_end);
+    let slants = match rows.iter().any(|r| r.0 == ParkingType::Angled) {
+        true => {
+            let Axis { min, max, step } = m.grid.slant_deg;
+            format!(
+                "Angled bays: at {min}° to {max}° from the direction of travel to the way out by \
+                 {step}°, 90° left out, tail in\nand nose in; their dead end is the way from the \
+                 middle of the spot's mouth.\n"
+            )
+        }
+        false => String::new(),
+    };
     let (back, depths) = (number(m.grid.back), depths.join(", "));
     let [behind, turn] = [m.start_behind, m.start_heading_max.to_degrees()].map(number);
     format!(
@@ -80,7 +91,7 @@ The grid of cells:
 {axes}
 A cell's lane reaches {back} m back from the spot's centre; {depths}. The largest dead end also
 stands for none at all.
-",
+{slants}",
         seed = m.seed,
         per_cell = m.samples_per_cell,
         budget = m.max_expansions,
@@ -148,6 +159,7 @@ fn spots(kind: ParkingType) -> &'static str {
         ParkingType::Forward => "forward bays (nose in)",
         ParkingType::Reverse => "reverse bays (tail in)",
         ParkingType::Parallel => "parallel spots",
+        ParkingType::Angled => "angled bays (30° to 150°, nose in or tail in)",
     }
 }
 
@@ -219,6 +231,7 @@ mod tests {
             kind: KIND,
             rows: 500,
             samples: 411,
+            solved: None,
             cells: 567,
             occupied_cells: 123,
             manoeuvres: 17,

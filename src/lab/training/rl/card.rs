@@ -20,7 +20,7 @@ pub(super) fn card(out: &Path, log: &RlLog) -> String {
         Course::Eval => "scenes of the generator that evaluates, of other seeds",
     };
     let mut validation = String::new();
-    for kind in ParkingType::ALL {
+    for kind in ParkingType::SQUARE {
         let share = |v: &super::log::Validation| percent(v.share(kind, c.validation_count));
         let _ =
             writeln!(validation, "| {kind} | {} | {} |", share(&best.sampled), share(&best.mean));
