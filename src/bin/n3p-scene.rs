@@ -12,7 +12,7 @@ use n3p::files::{reason, remove_leftovers};
 use n3p::vehicle::Vehicle;
 use n3p::world::bays::{Unusual, bay};
 use n3p::world::clutter::clutter;
-use n3p::world::generate::{GeneratorConfig, generate};
+use n3p::world::generate::{GeneratorConfig, generate, some_wide};
 use n3p::world::lots::lot;
 use n3p::world::{Level, ParkingType, Scene};
 
@@ -32,8 +32,8 @@ enum Command {
 
 #[derive(Args)]
 struct Generate {
-    /// Where the scenes lie: "home", parking lots as in the paper, of three levels; "lots", whole
-    /// car parks and streets; "clutter", vehicles of all sizes among anything; "bays", unusual bays.
+    /// Where the scenes lie: "home", parking lots as in the paper, of three levels; "wide", as there,
+    /// with sizes drawn far wider; "lots", whole car parks and streets; "clutter", vehicles of all sizes among anything; "bays", unusual bays.
     #[arg(long, value_enum, value_name = "WORLD")]
     world: World,
     /// Parking type; may be given several times [default: all].
@@ -48,8 +48,8 @@ struct Generate {
     /// Seed of the scenes.
     #[arg(long, value_name = "S")]
     seed: u64,
-    /// Vehicle, a TOML file such as experiments/vehicles/tpcap.toml, in the worlds "home" and
-    /// "lots" [default: a sedan 4.97 m long].
+    /// Vehicle, a TOML file such as experiments/vehicles/tpcap.toml, in the worlds "home", "wide"
+    /// and "lots" [default: a sedan 4.97 m long].
     #[arg(long, value_name = "FILE")]
     vehicle: Option<PathBuf>,
     /// Leave the parking type out of the files.
@@ -63,6 +63,7 @@ struct Generate {
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum World {
     Home,
+    Wide,
     Lots,
     Clutter,
     Bays,
@@ -122,9 +123,13 @@ fn scenes(args: &Generate) -> Result<Vec<Scene>> {
             format!("{option}: the world {} has no use for it; leave it out", world.get_name());
         Err(BadInput(text).into())
     };
-    useless("--type", !args.kinds.is_empty(), &[World::Home, World::Lots, World::Bays])?;
+    useless(
+        "--type",
+        !args.kinds.is_empty(),
+        &[World::Home, World::Wide, World::Lots, World::Bays],
+    )?;
     useless("--level", !args.levels.is_empty(), &[World::Home])?;
-    useless("--vehicle", args.vehicle.is_some(), &[World::Home, World::Lots])?;
+    useless("--vehicle", args.vehicle.is_some(), &[World::Home, World::Wide, World::Lots])?;
     let vehicle = match &args.vehicle {
         Some(path) => Vehicle::read(path).or_bad_input()?,
         None => Vehicle::default(),
@@ -140,6 +145,11 @@ fn scenes(args: &Generate) -> Result<Vec<Scene>> {
             let settings = kinds.flat_map(|k| levels.clone().map(move |l| (k, l)));
             let of = |(k, l)| each(&|i| generate(&config, &vehicle, k, l, seed, i));
             settings.flat_map(of).collect()
+        }
+        World::Wide => {
+            let count = args.count as usize;
+            let of = kinds.map(|k| some_wide(&vehicle, k, seed, count));
+            of.collect::<Result<Vec<_>, _>>().or_bad_input()?.concat()
         }
         World::Lots => kinds.flat_map(|k| each(&|i| lot(&vehicle, k, seed, i))).collect(),
         World::Clutter => each(&|i| clutter(seed, i)),

@@ -9,7 +9,7 @@ use crate::planners::Problem;
 use crate::rng::{Stream, rng};
 use crate::vehicle::Vehicle;
 use crate::world::cell::{Cell, Grid};
-use crate::world::generate::{GeneratorConfig, generate};
+use crate::world::generate::{GeneratorConfig, generate, wide};
 use crate::world::{Level, ParkingType};
 
 /// Where an agent learns.
@@ -19,7 +19,8 @@ use crate::world::{Level, ParkingType};
 pub enum Course {
     /// In abstracted environments: a lane, a spot, walls around. The paper's RL Simple.
     Simple,
-    /// In scenes of the generator that evaluates, of other seeds. The paper's RL Eval.
+    /// In generated scenes, of other seeds than those that evaluate: half of them like those, half with
+    /// sizes drawn far wider. The paper's RL Eval.
     Eval,
 }
 
@@ -62,7 +63,10 @@ impl Course {
             Self::Simple => cell_problem(vehicle, stratum, &mut rng(seed, Stream::Course, index)),
             Self::Eval => {
                 let (config, Stratum { kind, level }) = (GeneratorConfig::default(), stratum);
-                let scene = generate(&config, vehicle, kind, level, seed, index);
+                let usual = || generate(&config, vehicle, kind, level, seed, index);
+                let is_wide = index.is_multiple_of(2);
+                let wide = is_wide.then(|| wide(vehicle, kind, seed, index).ok()).flatten();
+                let scene = wide.unwrap_or_else(usual);
                 Problem::as_given(&scene).expect("generated scenes have free ends")
             }
         }

@@ -11,32 +11,24 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::sync::OnceLock;
 
 use crate::curves::{Path, Segment};
-use crate::geometry::{Aabb, Pose, signed_angle};
+use crate::geometry::{Aabb, Pose};
 use crate::vehicle::Vehicle;
 use crate::world::collision::{BodyFrame, Contact, Sweep};
 
+use self::rest::Passages;
 use super::Problem;
 use super::analytic::{AnalyticExpansion, Entry};
 use super::approach::{Approaches, Poses};
 use super::cost::CostModel;
-use super::joint;
 
-/// A car this near to a pose of a manoeuvre stands within it, metres: distance, and turn at full
-/// lock. Poses are looked at so far apart along it. Both for the default vehicle.
-const BESIDE: f64 = 0.4;
-const STRIDE: f64 = 0.25;
+mod rest;
+
 /// Free manoeuvres tried for something cheaper than a plan, and by which share at least.
 const BETTER: usize = 10;
 const GAIN: f64 = 0.03;
-/// Newton's steps to the pose beside the start.
-const STEPS_BESIDE: usize = 4;
-/// The cheapest rests of manoeuvres that are looked at, and the free ones among them that are bent to begin
-/// at the start.
-const NEAR_RESTS: usize = 50;
-const RESTS: usize = 3;
-
 /// Manoeuvres prepared for one footprint and one cost model.
 #[derive(Clone, Debug)]
 pub struct Library {
@@ -45,6 +37,8 @@ pub struct Library {
     manoeuvres: Vec<Manoeuvre>,
     /// Where they begin, seen from the goal, and their costs: all that ranking looks at.
     begins: Poses,
+    /// Where they pass, found out once somebody asks.
+    passages: OnceLock<Passages>,
 }
 
 /// A known way to the goal; poses are seen from the goal.
@@ -69,8 +63,8 @@ impl Library {
         footprint: Aabb,
         model: &CostModel,
     ) -> Self {
-        let (all, begins) = Default::default();
-        let mut library = Self { vehicle: *vehicle, footprint, manoeuvres: all, begins };
+        let (all, begins, passages) = Default::default();
+        let mut library = Self { vehicle: *vehicle, footprint, manoeuvres: all, begins, passages };
         for segments in manoeuvres {
             library.add(segments.clone(), model);
         }
@@ -102,72 +96,12 @@ impl Library {
         let entry = Entry::new(pose, segments, true, &self.vehicle, model);
         self.begins.push(entry.pose, entry.cost());
         self.manoeuvres.push(Manoeuvre { entry, begins, motions });
+        self.passages.take();
     }
 
     /// Whether it was prepared for the vehicle and the footprint of `problem`.
     pub fn fits(&self, problem: &Problem) -> bool {
         self.vehicle == problem.vehicle && self.footprint == *problem.collision.footprint()
-    }
-
-    /// The plan of a car that stands within a manoeuvre, or beside one: its rest, bent to begin at
-    /// the start. The cheapest of those that are free and cost less than `bound`; `None` where the car
-    /// stands within none.
-    pub fn rest(&self, problem: &Problem, model: &CostModel, bound: f64) -> Option<(Path, f64)> {
-        let start = problem.goal.relative(problem.start);
-        let near = self.manoeuvres.iter().filter_map(|m| self.rest_of(m, start));
-        let cost = |path: &Path| model.path(&self.vehicle, &path.segments);
-        let near = near.map(|path| (cost(&path), path));
-        let mut near: Vec<(f64, Path)> = near.filter(|(cost, _)| *cost < bound).collect();
-        near.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let here =
-            |(_, rest): (f64, Path)| Path { start: problem.goal.compose(rest.start), ..rest };
-        let nearest = near.into_iter().take(NEAR_RESTS).map(here);
-        let free = nearest.filter(|rest| problem.collision.path_is_free(rest));
-        let mut bent = free.take(RESTS).filter_map(|rest| {
-            let path = joint::close(problem, &rest)?;
-            let cost = cost(&path);
-            (cost < bound).then_some((path, cost))
-        });
-        // In order of cost, which bending hardly changes.
-        bent.next()
-    }
-
-    /// The rest of a manoeuvre from where it passes nearest to `start`, if that is near; poses are
-    /// seen from the goal.
-    fn rest_of(&self, manoeuvre: &Manoeuvre, start: Pose) -> Option<Path> {
-        let scale = self.vehicle.scale();
-        let radius = self.vehicle.turning_radius();
-        let motions = &manoeuvre.entry.rest;
-        let (mut best, mut nearest) = (None, BESIDE * scale);
-        for (i, (s, ends)) in motions.iter().zip(manoeuvre.begins.windows(2)).enumerate() {
-            // Nothing of this motion comes as near as the best: neither its places nor its headings.
-            let (pose, length) = (ends[0], s.length.abs());
-            let apart = pose.distance(start).min(ends[1].distance(start)) - length / 2.0;
-            let turn_to = |at: Pose| signed_angle(at.heading, start.heading).abs();
-            let turn = turn_to(pose) - length * s.curvature.abs();
-            if apart.max(turn * radius) > nearest {
-                continue;
-            }
-            let steps = (length / (STRIDE * scale)).ceil().max(1.0);
-            for k in 0..steps as usize {
-                let driven = s.length * k as f64 / steps;
-                let at = s.at(pose, driven);
-                let apart = at.distance(start) + turn_to(at) * radius;
-                if apart < nearest {
-                    (best, nearest) = (Some((i, driven, at)), apart);
-                }
-            }
-        }
-        let (i, mut driven, mut at) = best?;
-        // Right beside the start rather than a stride away: nothing is to be bent for who stands on it.
-        for _ in 0..STEPS_BESIDE {
-            let ahead = at.point_to_local(start.position()).x * motions[i].gear().sign();
-            driven = (driven.abs() + ahead).clamp(0.0, motions[i].length.abs())
-                * motions[i].gear().sign();
-            at = motions[i].at(manoeuvre.begins[i], driven);
-        }
-        let first = Segment { length: motions[i].length - driven, ..motions[i] };
-        Some(Path::new(at, std::iter::once(first).chain(motions[i + 1..].iter().copied())))
     }
 
     /// Number of manoeuvres.
@@ -481,6 +415,31 @@ mod tests {
                 let found: Vec<usize> = (0..library.len()).filter(free).collect();
                 assert_eq!(found, expected);
             }
+        }
+    }
+
+    #[test]
+    fn whoever_stands_within_a_manoeuvre_is_found() {
+        for kind in ParkingType::ALL {
+            let problem = &problems(kind, Level::Easy, 5)[0];
+            let library = library(kind, *problem.collision.footprint());
+            let vehicle = &problem.vehicle;
+            let passages = Passages::new(&library.manoeuvres, vehicle);
+            let mut found = 0;
+            for i in 0..300 {
+                // Beside some pose of some manoeuvre.
+                let poses = library.manoeuvres[i % library.len()].poses(1.0);
+                let (.., at) = poses.step_by(3).nth(i % 5).unwrap();
+                let [x, y, turn] = [7, 11, 13].map(|k| (i * k % 101) as f64 / 50.0 - 1.0);
+                let pose = at.compose(Pose::new(0.3 * x, 0.3 * y, 0.1 * turn));
+                let near = passages.near(pose);
+                for (m, manoeuvre) in library.manoeuvres.iter().enumerate() {
+                    let is_within = manoeuvre.rest(pose, vehicle).is_some();
+                    assert!(!is_within || near.contains(&m), "{kind} {m} {pose:?}");
+                    found += usize::from(is_within);
+                }
+            }
+            assert!(found > 100, "{kind}: {found}");
         }
     }
 

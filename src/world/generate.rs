@@ -23,8 +23,10 @@ use crate::vehicle::Vehicle;
 
 mod angled;
 mod config;
+mod wide;
 
 pub use config::{GeneratorConfig, GeneratorError, LevelConfig};
+pub use wide::{some_wide, wide};
 
 /// How far scenes reach along the lane, metres to either side of the spot.
 const EXTENT: f64 = 20.0;

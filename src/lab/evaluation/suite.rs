@@ -14,7 +14,7 @@ use crate::n3p::{Models, ModelsError};
 use crate::planners::goals::{self, Terms};
 use crate::planners::{Budget, Planner, ProblemError};
 use crate::vehicle::Vehicle;
-use crate::world::generate::{GeneratorConfig, GeneratorError, generate};
+use crate::world::generate::{GeneratorConfig, GeneratorError, generate, some_wide};
 use crate::world::lots::lot;
 use crate::world::scene::SceneError;
 use crate::world::{Level, ParkingType, Scene};
@@ -77,6 +77,8 @@ pub enum SuiteError {
 pub enum World {
     /// Parking lots as in the paper, of three levels: what methods are trained and tuned for.
     Home,
+    /// As at home, with sizes drawn far wider than those of any level: what methods are chosen by.
+    Wide,
     /// Whole car parks and streets, for which nothing is trained or tuned.
     Lots,
 }
@@ -86,6 +88,7 @@ impl World {
     pub fn name(self) -> &'static str {
         match self {
             Self::Home => "home",
+            Self::Wide => "wide",
             Self::Lots => "lots",
         }
     }
@@ -118,21 +121,24 @@ impl Drawn<'_> {
         if world == World::Home {
             generator.validate(vehicle)?;
         }
-        let levels = match world {
-            World::Home => levels.iter().copied().map(Some).collect(),
-            World::Lots => vec![None],
-        };
+        let set = || world.name().to_owned();
         let mut cases = Vec::new();
         for &kind in kinds {
-            for &level in &levels {
-                for index in 0..count as u64 {
-                    let scene = match level {
-                        Some(level) => generate(generator, vehicle, kind, level, seed, index),
-                        None => lot(vehicle, kind, seed, index),
-                    };
-                    let set = world.name().to_owned();
-                    cases.push(Case { scene, kind: Some(kind), level, set });
+            let indices = || 0..count as u64;
+            let mut add = |scene, level| {
+                cases.push(Case { scene, kind: Some(kind), level, set: set() });
+            };
+            match world {
+                World::Home => levels.iter().for_each(|&level| {
+                    let of = |index| generate(generator, vehicle, kind, level, seed, index);
+                    indices().for_each(|index| add(of(index), Some(level)));
+                }),
+                World::Wide => {
+                    for scene in some_wide(vehicle, kind, seed, count)? {
+                        add(scene, None);
+                    }
                 }
+                World::Lots => indices().for_each(|i| add(lot(vehicle, kind, seed, i), None)),
             }
         }
         Ok(cases)

@@ -7,7 +7,6 @@
 //! everything that is known: what no plan uses is forgotten, and what many use comes first.
 
 use indicatif::ProgressBar;
-use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
 use super::library::Source;
@@ -19,11 +18,9 @@ use crate::lab::progress;
 use crate::planners::cost::CostModel;
 use crate::planners::library::{Library, LibrarySearch, Verdicts};
 use crate::planners::{Budget, Effort, HybridAStar, Planner, Problem};
-use crate::rng::{Stream, rng};
 use crate::selectors::fleet::scaled;
-use crate::vehicle::Vehicle;
-use crate::world::generate::{GeneratorConfig, LevelConfig, generate};
-use crate::world::{Level, ParkingType, Scene, Stance};
+use crate::world::generate::wide;
+use crate::world::{Scene, Stance};
 
 /// A plan that costs at most so many times the teacher's will do.
 const GOOD: f64 = 1.05;
@@ -120,63 +117,20 @@ impl Worlds<'_> {
         for index in 0..self.config.count {
             let at = index as usize % sources.len();
             let Metadata { vehicle, grid, .. } = sources[at].metadata;
-            let scene = self.world(vehicle, stance.kind(), index);
+            let scene = wide(vehicle, stance.kind(), self.config.seed, u64::from(index));
             let apart =
                 |scene: &Scene, s: Stance| signed_angle(scene.goal.heading, s.heading()).abs();
             let of = grid.stances(stance.kind());
             let is_other =
                 |scene: &Scene| of.iter().any(|&other| apart(scene, other) < apart(scene, stance));
-            if scene.as_ref().is_some_and(is_other) {
+            if scene.as_ref().is_ok_and(is_other) {
                 continue;
             }
             self.progress.inc(1);
-            if let Some(problem) = scene.and_then(|scene| Problem::new(&scene).ok()) {
+            if let Some(problem) = scene.ok().and_then(|scene| Problem::new(&scene).ok()) {
                 each(at, &problem);
             }
         }
-    }
-
-    /// The world of a number, in the spot frame; `None` where its sizes leave no room for the vehicle.
-    fn world(&self, vehicle: &Vehicle, kind: ParkingType, index: u32) -> Option<Scene> {
-        // Which of the random streams it is: part of what models are made of, so never renumbered.
-        let number = match kind {
-            ParkingType::Forward => 0,
-            ParkingType::Parallel => 1,
-            ParkingType::Reverse => 2,
-            ParkingType::Angled => 3,
-        };
-        let mut rng = rng(self.config.seed, Stream::World, u64::from(index) << 8 | number);
-        let mut between = |min: f64, max: f64| rng.random_range(min..=max);
-        let config = drawn(vehicle, &mut between);
-        config.validate(vehicle).ok()?;
-        Some(generate(&config, vehicle, kind, Level::Complex, rng.random(), 0))
-    }
-}
-
-/// Sizes of one world, in metres for the default vehicle, of `vehicle`'s size.
-fn drawn(vehicle: &Vehicle, between: &mut impl FnMut(f64, f64) -> f64) -> GeneratorConfig {
-    let mut size = |min: f64, max: f64| between(min, max) * vehicle.scale();
-    let exactly = |v: f64| [v, v];
-    let level = LevelConfig {
-        bay_spot_width: exactly(size(2.3, 4.2)),
-        parallel_spot_width: exactly(size(5.8, 8.2)),
-        dead_end_probability: 0.75,
-        dead_end: exactly(size(4.0, 13.0)),
-    };
-    let usual = GeneratorConfig::default();
-    GeneratorConfig {
-        easy: level,
-        complex: level,
-        extreme: level,
-        lane_width: size(4.6, 8.0),
-        bay_depth: size(5.25, 6.2),
-        parallel_depth: size(2.2, 2.8),
-        passing_room: size(0.9, 1.4),
-        max_slant: between(0.0, 0.08),
-        lane_car_probability: 0.4,
-        max_incline: 0.35,
-        start_reach: [-3.4, 3.4],
-        ..usual
     }
 }
 

@@ -1,0 +1,155 @@
+//! Who stands within a known manoeuvre, or beside one, goes on with its rest.
+
+use std::f64::consts::TAU;
+
+use super::{Library, Manoeuvre};
+use crate::curves::{Path, Segment};
+use crate::geometry::{Pose, signed_angle};
+use crate::planners::cost::CostModel;
+use crate::planners::{Problem, joint};
+use crate::vehicle::Vehicle;
+
+/// A car this near to a pose of a manoeuvre stands within it, metres: distance, and turn at full
+/// lock. Poses are looked at so far apart along it. Both for the default vehicle.
+const BESIDE: f64 = 0.4;
+const STRIDE: f64 = 0.25;
+/// Newton's steps to the pose beside the start.
+const STEPS_BESIDE: usize = 4;
+/// The cheapest rests of manoeuvres that are looked at, and the free ones among them that are bent to begin
+/// at the start.
+const NEAR_RESTS: usize = 50;
+const RESTS: usize = 3;
+
+/// Which manoeuvres of a library pass where, seen from the goal.
+#[derive(Clone, Debug)]
+pub(super) struct Passages {
+    /// A box of poses and a manoeuvre that passes through it, in ascending order: see
+    /// [`Boxes::number`].
+    passages: Vec<u64>,
+    boxes: Boxes,
+}
+
+/// Boxes of poses: as large as what is near to a pose, so that this lies in its box and those around.
+#[derive(Clone, Copy, Debug)]
+struct Boxes {
+    /// Metres.
+    side: f64,
+    /// Of a full turn.
+    turns: i64,
+}
+
+impl Boxes {
+    fn new(vehicle: &Vehicle) -> Self {
+        let side = BESIDE * vehicle.scale();
+        let turns = (TAU * vehicle.turning_radius() / side).floor().max(1.0) as i64;
+        Self { side, turns: turns.min(1 << 8) }
+    }
+
+    fn of(&self, pose: Pose) -> [i64; 3] {
+        let place = |v: f64| (v / self.side).floor() as i64;
+        let turn = (pose.heading.rem_euclid(TAU) / TAU * self.turns as f64) as i64;
+        [place(pose.x), place(pose.y), turn]
+    }
+
+    /// The number of a box, in the upper 32 bits. Boxes far away share some.
+    fn number(&self, [x, y, turn]: [i64; 3]) -> u64 {
+        let twelve = |v: i64| v as u64 & 0xfff;
+        (twelve(x) << 20 | twelve(y) << 8 | turn.rem_euclid(self.turns) as u64) << 32
+    }
+}
+
+impl Passages {
+    pub(super) fn new(manoeuvres: &[Manoeuvre], vehicle: &Vehicle) -> Self {
+        let boxes = Boxes::new(vehicle);
+        let mut passages = Vec::new();
+        for (index, manoeuvre) in manoeuvres.iter().enumerate() {
+            let poses = manoeuvre.poses(vehicle.scale()).map(|(_, _, at)| at);
+            passages.extend(poses.map(|at| boxes.number(boxes.of(at)) | index as u64));
+        }
+        passages.sort_unstable();
+        passages.dedup();
+        Self { passages, boxes }
+    }
+
+    /// Those that pass near a pose, in ascending order, and perhaps a few others.
+    pub(super) fn near(&self, pose: Pose) -> Vec<usize> {
+        let [x, y, turn] = self.boxes.of(pose);
+        let mut near = Vec::new();
+        for beside in 0..27 {
+            let (dx, dy, dt) = (beside / 9 - 1, beside / 3 % 3 - 1, beside % 3 - 1);
+            let number = self.boxes.number([x + dx, y + dy, turn + dt]);
+            let from = self.passages.partition_point(|&p| p < number);
+            let here = self.passages[from..].iter().take_while(|&&p| p >> 32 == number >> 32);
+            near.extend(here.map(|&p| (p & 0xffff_ffff) as usize));
+        }
+        near.sort_unstable();
+        near.dedup();
+        near
+    }
+}
+
+impl Manoeuvre {
+    /// Poses along it: the number of the motion, how much of it is driven, and the pose.
+    pub(super) fn poses(&self, scale: f64) -> impl Iterator<Item = (usize, f64, Pose)> {
+        let motions = self.entry.rest.iter().zip(&self.begins).enumerate();
+        motions.flat_map(move |(i, (motion, &begin))| {
+            let steps = (motion.length.abs() / (STRIDE * scale)).ceil().max(1.0);
+            (0..steps as usize).map(move |k| {
+                let driven = motion.length * k as f64 / steps;
+                (i, driven, motion.at(begin, driven))
+            })
+        })
+    }
+
+    /// What is left of it from where it passes nearest to `start`, if that is near; poses are seen from
+    /// the goal.
+    pub(super) fn rest(&self, start: Pose, vehicle: &Vehicle) -> Option<Path> {
+        let (scale, radius) = (vehicle.scale(), vehicle.turning_radius());
+        let motions = &self.entry.rest;
+        let (mut best, mut nearest) = (None, BESIDE * scale);
+        for (i, driven, at) in self.poses(scale) {
+            let turn = signed_angle(at.heading, start.heading).abs();
+            let apart = at.distance(start) + turn * radius;
+            if apart < nearest {
+                (best, nearest) = (Some((i, driven, at)), apart);
+            }
+        }
+        let (i, mut driven, mut at) = best?;
+        // Right beside the start rather than a stride away: nothing is to be bent for who stands on it.
+        for _ in 0..STEPS_BESIDE {
+            let ahead = at.point_to_local(start.position()).x * motions[i].gear().sign();
+            driven = (driven.abs() + ahead).clamp(0.0, motions[i].length.abs())
+                * motions[i].gear().sign();
+            at = motions[i].at(self.begins[i], driven);
+        }
+        let first = Segment { length: motions[i].length - driven, ..motions[i] };
+        Some(Path::new(at, std::iter::once(first).chain(motions[i + 1..].iter().copied())))
+    }
+}
+
+impl Library {
+    /// The plan of a car that stands within a manoeuvre, or beside one: its rest, bent to begin at
+    /// the start. The cheapest of those that are free and cost less than `bound`; `None` where the car
+    /// stands within none.
+    pub fn rest(&self, problem: &Problem, model: &CostModel, bound: f64) -> Option<(Path, f64)> {
+        let passages = self.passages.get_or_init(|| Passages::new(&self.manoeuvres, &self.vehicle));
+        let start = problem.goal.relative(problem.start);
+        let near = passages.near(start).into_iter();
+        let near = near.filter_map(|i| self.manoeuvres[i].rest(start, &self.vehicle));
+        let cost = |path: &Path| model.path(&self.vehicle, &path.segments);
+        let near = near.map(|path| (cost(&path), path));
+        let mut near: Vec<(f64, Path)> = near.filter(|(cost, _)| *cost < bound).collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let here =
+            |(_, rest): (f64, Path)| Path { start: problem.goal.compose(rest.start), ..rest };
+        let nearest = near.into_iter().take(NEAR_RESTS).map(here);
+        let free = nearest.filter(|rest| problem.collision.path_is_free(rest));
+        let mut bent = free.take(RESTS).filter_map(|rest| {
+            let path = joint::close(problem, &rest)?;
+            let cost = cost(&path);
+            (cost < bound).then_some((path, cost))
+        });
+        // In order of cost, which bending hardly changes.
+        bent.next()
+    }
+}
