@@ -98,8 +98,10 @@ fn what_would_be_lost_or_mixed_up_is_refused() {
     assert!(e.contains("other settings"), "{e}");
     let e = refused(&["--resume", "--env", "simple"]);
     assert!(e.contains("cannot be used multiple times"), "{e}");
-    let e = refused(&["--device", "cuda"]);
-    assert!(e.contains("--features cuda"), "{e}");
+    let e = refused(&["--resume", "--set", "episode=9"]);
+    assert!(e.contains("--set episode=9: unknown field `episode`"), "{e}");
+    let e = refused(&["--resume", "--set", "episodes=0"]);
+    assert!(e.contains("episodes is 0"), "{e}");
     let checkpoint = dir.path().join("p.checkpoint");
     let bytes = fs::read(&checkpoint).unwrap();
     for length in [0, 7, 100, bytes.len() / 2, bytes.len() - 1] {

@@ -18,7 +18,7 @@ fn data(name: &str) -> Dataset {
     let data = Dataset::read(&Path::new("datasets").join(name), None).unwrap();
     assert_eq!(data.kinds(), ParkingType::SQUARE);
     let file = format!("datasets/{name}.toml");
-    let settings = CollectConfig::read(file.as_ref()).unwrap().metadata();
+    let settings = CollectConfig::read(Some(file.as_ref()), &[]).unwrap().metadata();
     assert_eq!(data.metadata.settings_difference(&settings), None, "{file}");
     data
 }
@@ -31,9 +31,9 @@ fn the_small_data_set_has_its_settings() {
 #[test]
 fn the_models_come_from_the_papers_data_set_and_settings() {
     let data = data("paper");
-    let experiment = ExperimentConfig::read("experiments/paper.toml".as_ref()).unwrap();
+    let experiment = ExperimentConfig::read("experiments/paper.toml".as_ref(), &[]).unwrap();
     assert_eq!(data.metadata.content_difference(&experiment.collect.metadata()), None);
-    let training = MlpConfig::read("models/mlp.toml".as_ref()).unwrap();
+    let training = MlpConfig::read(Some("models/mlp.toml".as_ref()), &[]).unwrap();
     assert_eq!(training, experiment.train.mlp);
 
     let knn = KnnSelector::load("models/knn.bin".as_ref()).unwrap();
@@ -53,8 +53,8 @@ fn the_models_come_from_the_papers_data_set_and_settings() {
 
 #[test]
 fn the_policies_come_from_the_papers_settings() {
-    let experiment = ExperimentConfig::read("experiments/paper.toml".as_ref()).unwrap();
-    let training = RlConfig::read("models/rl.toml".as_ref()).unwrap();
+    let experiment = ExperimentConfig::read("experiments/paper.toml".as_ref(), &[]).unwrap();
+    let training = RlConfig::read(Some("models/rl.toml".as_ref()), &[]).unwrap();
     assert_eq!(training, experiment.train.rl);
     assert_ne!(training.seed, experiment.evaluate.seed);
     assert_ne!(training.validation_seed, experiment.evaluate.seed);

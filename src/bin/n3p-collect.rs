@@ -8,6 +8,7 @@ use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::lab::dataset::{self, CollectConfig, CollectOptions, Dataset, Part, TypeReport};
 use n3p::lab::progress;
+use n3p::toml_file::Setting;
 use n3p::vehicle::Vehicle;
 use n3p::world::ParkingType;
 
@@ -29,6 +30,9 @@ struct Args {
     /// Folder of the data set
     #[arg(long, value_name = "DIR", default_value = "datasets/default")]
     out: PathBuf,
+    /// A setting instead of the file's, such as grid.back=8.0; may be given several times
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<Setting>,
     /// Go on with what an earlier run left
     #[arg(long)]
     resume: bool,
@@ -46,10 +50,7 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let mut config = match &args.config {
-        Some(path) => CollectConfig::read(path).or_bad_input()?,
-        None => CollectConfig::default(),
-    };
+    let mut config = CollectConfig::read(args.config.as_deref(), &args.set).or_bad_input()?;
     if let Some(path) = &args.vehicle {
         config.vehicle = Vehicle::read(path).or_bad_input()?;
     }

@@ -10,6 +10,7 @@ use n3p::files::reason;
 use n3p::lab::evaluation::{report, rows};
 use n3p::lab::experiments::{ExperimentConfig, ExperimentError, Given, runner};
 use n3p::lab::training;
+use n3p::toml_file::Setting;
 use n3p::vehicle::Vehicle;
 
 /// Runs experiments: collect, train, evaluate and report, all from one file.
@@ -67,6 +68,9 @@ struct GivenArgs {
     /// Another vehicle than the experiment's, a TOML file; its name joins that of the results
     #[arg(long, value_name = "FILE")]
     vehicle: Option<PathBuf>,
+    /// A setting instead of the file's, such as evaluate.count=20; may be given several times
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<Setting>,
 }
 
 impl From<&GivenArgs> for Given {
@@ -95,7 +99,7 @@ fn main() -> ExitCode {
 
 /// The experiment, with the vehicle given.
 fn read(file: &Path, args: &GivenArgs) -> Result<ExperimentConfig> {
-    let config = ExperimentConfig::read(file).or_bad_input()?;
+    let config = ExperimentConfig::read(file, &args.set).or_bad_input()?;
     let Some(path) = &args.vehicle else { return Ok(config) };
     let vehicle = Vehicle::read(path).or_bad_input()?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -164,7 +168,7 @@ fn list(folder: &Path) -> Result<ExitCode> {
     files.retain(|f| f.extension().is_some_and(|e| e == "toml"));
     files.sort();
     for file in files {
-        match ExperimentConfig::read(&file) {
+        match ExperimentConfig::read(&file, &[]) {
             Ok(config) => cli::print(format!("{}: {}", file.display(), config.description))?,
             Err(error) => cli::print(error)?,
         }

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use candle_core::Device;
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::environment::courses::{Course, Stratum};
 use n3p::lab::dataset::Dataset;
@@ -14,6 +14,7 @@ use n3p::lab::training::rl::{Begin, RlConfig};
 use n3p::lab::training::worlds::WorldsConfig;
 use n3p::lab::training::{self, MlpConfig, TrainingError};
 use n3p::selectors::artefact;
+use n3p::toml_file::Setting;
 use n3p::world::ParkingType;
 
 /// Trains selectors from data sets, and driving policies; each becomes one model file.
@@ -68,6 +69,9 @@ struct MlpArgs {
     /// Settings of the training, a TOML file; the defaults when omitted
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// A setting instead of the file's, such as epochs=5; may be given several times
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<Setting>,
     /// Seed of weights, shuffling and validation cells; overrides the settings
     #[arg(long, value_name = "S")]
     seed: Option<u64>,
@@ -102,6 +106,9 @@ struct FleetArgs {
     /// Settings of the networks' training, a TOML file; the defaults when omitted
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// A setting instead of the file's, such as epochs=5; may be given several times
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<Setting>,
     /// Seed of worlds, weights, shuffling and validation rows; overrides the settings
     #[arg(long, value_name = "S")]
     seed: Option<u64>,
@@ -127,18 +134,12 @@ struct RlArgs {
     /// Settings of the training, a TOML file; the defaults when omitted
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// A setting instead of the file's, such as sac.gamma=0.99; may be given several times
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<Setting>,
     /// Go on from the checkpoint beside the policy file, if there is one
     #[arg(long)]
     resume: bool,
-    /// Where tensors are computed; cuda needs a build with the feature "cuda"
-    #[arg(long, value_enum, default_value_t = DeviceName::Cpu)]
-    device: DeviceName,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum DeviceName {
-    Cpu,
-    Cuda,
 }
 
 fn main() -> ExitCode {
@@ -154,7 +155,7 @@ fn main() -> ExitCode {
 }
 
 fn mlp(args: &MlpArgs) -> anyhow::Result<ExitCode> {
-    let config = mlp_config(args.config.as_deref(), args.seed)?;
+    let config = mlp_config(args.config.as_deref(), &args.set, args.seed)?;
     if args.out.is_some() && args.common.kind.is_none() {
         let text = "--out names one file, but every type gets its own: give --type, too";
         return Err(BadInput(text.to_owned()).into());
@@ -198,11 +199,12 @@ fn quality(rows: usize, errors: &Errors, reach: &Reach) -> String {
 }
 
 /// The settings of a file, or the usual ones, with another seed if asked for.
-fn mlp_config(file: Option<&Path>, seed: Option<u64>) -> anyhow::Result<MlpConfig> {
-    let mut config = match file {
-        Some(path) => MlpConfig::read(path).or_bad_input()?,
-        None => MlpConfig::default(),
-    };
+fn mlp_config(
+    file: Option<&Path>,
+    set: &[Setting],
+    seed: Option<u64>,
+) -> anyhow::Result<MlpConfig> {
+    let mut config = MlpConfig::read(file, set).or_bad_input()?;
     config.seed = seed.unwrap_or(config.seed);
     config.validate().or_bad_input()?;
     Ok(config)
@@ -229,7 +231,7 @@ fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn fleet(args: &FleetArgs) -> anyhow::Result<ExitCode> {
-    let config = mlp_config(args.config.as_deref(), args.seed)?;
+    let config = mlp_config(args.config.as_deref(), &args.set, args.seed)?;
     let worlds = WorldsConfig { count: args.worlds, seed: config.seed };
     worlds.validate().or_bad_input()?;
     artefact::check_writable(&args.out).or_bad_input()?;
@@ -279,21 +281,18 @@ fn fleet(args: &FleetArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn rl(args: &RlArgs) -> anyhow::Result<ExitCode> {
-    let mut config = match &args.config {
-        Some(path) => RlConfig::read(path).or_bad_input()?,
-        None => RlConfig::default(),
-    };
+    let mut config = RlConfig::read(args.config.as_deref(), &args.set).or_bad_input()?;
     config.episodes = args.episodes.unwrap_or(config.episodes);
     config.seed = args.seed.unwrap_or(config.seed);
     config.validate().or_bad_input()?;
     let default = || PathBuf::from(format!("models/rl-{}.safetensors", args.course.name()));
     let out = args.out.clone().unwrap_or_else(default);
     artefact::check_writable(&out).or_bad_input()?;
-    let device = args.device.open()?;
     let begin = if args.resume { Begin::Resume } else { Begin::Anew };
-    let log = training::rl::train(args.course, &config, &out, begin, &device).map_err(|e| {
-        if e.is_bad_input() { BadInput(e.to_string()).into() } else { anyhow::Error::from(e) }
-    })?;
+    let log =
+        training::rl::train(args.course, &config, &out, begin, &Device::Cpu).map_err(|e| {
+            if e.is_bad_input() { BadInput(e.to_string()).into() } else { anyhow::Error::from(e) }
+        })?;
     let best = log.best();
     let problems = Stratum::COUNT * config.validation_count;
     cli::print(format!(
@@ -307,21 +306,6 @@ fn rl(args: &RlArgs) -> anyhow::Result<ExitCode> {
         log.points.last().map_or(0, |p| p.updates),
     ))?;
     Ok(ExitCode::SUCCESS)
-}
-
-impl DeviceName {
-    fn open(self) -> anyhow::Result<Device> {
-        match self {
-            Self::Cpu => Ok(Device::Cpu),
-            Self::Cuda if !cfg!(feature = "cuda") => {
-                let text = "--device cuda: this build has no CUDA; build with --features cuda, \
-                            or use --device cpu";
-                Err(BadInput(text.to_owned()).into())
-            }
-            Self::Cuda => Device::new_cuda(0)
-                .map_err(|e| BadInput(format!("--device cuda: no device to use: {e}")).into()),
-        }
-    }
 }
 
 /// The data set, and the parking types to train: the one asked for or all it holds.

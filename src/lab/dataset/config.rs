@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::schema::{FORMAT_VERSION, GIT_REVISION, Metadata};
 use crate::planners::HybridAStarConfig;
-use crate::toml_file::{TomlError, read_toml};
+use crate::toml_file::{Setting, TomlError, read_settings};
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
 use crate::world::cell::Grid;
@@ -75,10 +75,14 @@ impl CollectConfig {
     /// The most rows of one file: they are held in memory, and make one row group.
     pub const MAX_SHARD_ROWS: u64 = 1 << 20;
 
-    /// Reads and checks a TOML file.
-    pub fn read(path: &Path) -> Result<Self, ConfigError> {
-        let config: Self = read_toml(path)?;
-        config.validate().map_err(|e| ConfigError::Value(format!("{}: {e}", path.display())))?;
+    /// Reads a TOML file, or the defaults, with the settings of `set` instead of theirs, and checks
+    /// them.
+    pub fn read(file: Option<&Path>, set: &[Setting]) -> Result<Self, ConfigError> {
+        let config: Self = read_settings(file, set)?;
+        config.validate().map_err(|e| match file {
+            Some(path) => ConfigError::Value(format!("{}: {e}", path.display())),
+            None => e,
+        })?;
         Ok(config)
     }
 
@@ -158,7 +162,7 @@ mod tests {
     fn error_of(text: &str) -> String {
         let file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
         std::fs::write(file.path(), text).unwrap();
-        CollectConfig::read(file.path()).unwrap_err().to_string()
+        CollectConfig::read(Some(file.path()), &[]).unwrap_err().to_string()
     }
 
     #[test]

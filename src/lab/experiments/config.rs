@@ -15,7 +15,7 @@ use crate::n3p::RolloutConfig;
 use crate::n3p::guided::RankedConfig;
 use crate::n3p::{Method, MethodSettings};
 use crate::planners::{Budget, Effort, HybridAStarConfig, Problem};
-use crate::toml_file::{TomlError, read_toml};
+use crate::toml_file::{Setting, TomlError, read_settings};
 use crate::vehicle::Vehicle;
 use crate::world::generate::GeneratorConfig;
 use crate::world::{Level, ParkingType};
@@ -223,11 +223,11 @@ pub enum ConfigError {
 }
 
 impl ExperimentConfig {
-    /// Reads, resolves and checks an experiment.
-    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+    /// Reads an experiment, with the settings of `set` instead of its own, resolves and checks it.
+    pub fn read(path: &Path, set: &[Setting]) -> Result<Self, ConfigError> {
         let value = |message| ConfigError::Value { path: path.to_owned(), message };
-        let config = Self { folder: path.with_file_name(""), ..read_toml(path)? };
-        let written: toml::Table = read_toml(path)?;
+        let config = Self { folder: path.with_file_name(""), ..read_settings(Some(path), set)? };
+        let written: toml::Table = read_settings(Some(path), set)?;
         if let Some(key) = misplaced(&written) {
             let top = key.rsplit('.').next().unwrap_or(key);
             return Err(value(format!("{key}: set {top} once, at the top of the file, not here")));
@@ -395,7 +395,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.toml");
         std::fs::write(&path, text).unwrap();
-        ExperimentConfig::read(&path)
+        ExperimentConfig::read(&path, &[])
     }
 
     #[test]

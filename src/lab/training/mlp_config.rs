@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::TrainingError;
 use super::settings::{self, real, whole};
+use crate::toml_file::Setting;
 
 /// How far off an output is, per normalised component.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -102,9 +103,10 @@ impl Default for MlpConfig {
 }
 
 impl MlpConfig {
-    /// Reads and checks a TOML file; absent settings keep their defaults.
-    pub fn read(path: &Path) -> Result<Self, TrainingError> {
-        settings::read(path, Self::validate)
+    /// Reads a TOML file, or the defaults, with the settings of `set` instead of theirs, and checks
+    /// them; absent settings keep their defaults.
+    pub fn read(file: Option<&Path>, set: &[Setting]) -> Result<Self, TrainingError> {
+        settings::read(file, set, Self::validate)
     }
 
     /// Checks every setting.
@@ -158,11 +160,11 @@ mod tests {
             ("batch = ", "mlp.toml: line 1 (`batch =`):"),
         ] {
             std::fs::write(&path, text).unwrap();
-            let error = MlpConfig::read(&path).unwrap_err().to_string();
+            let error = MlpConfig::read(Some(&path), &[]).unwrap_err().to_string();
             assert!(error.contains(told) && !error.contains('\n'), "{error}");
         }
         std::fs::write(&path, "loss = \"mse\"").unwrap();
-        assert_eq!(MlpConfig::read(&path).unwrap().loss, Loss::Mse);
+        assert_eq!(MlpConfig::read(Some(&path), &[]).unwrap().loss, Loss::Mse);
     }
 
     #[test]

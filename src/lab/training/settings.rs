@@ -6,16 +6,20 @@ use std::path::Path;
 use serde::de::DeserializeOwned;
 
 use super::TrainingError;
-use crate::toml_file::read_toml;
+use crate::toml_file::{Setting, read_settings};
 
-/// Reads a TOML file of settings and checks them; absent ones keep their defaults.
+/// Reads settings of a TOML file, overridden by those of `set`, and checks them; absent ones keep their
+/// defaults.
 pub(super) fn read<T: DeserializeOwned>(
-    path: &Path,
+    file: Option<&Path>,
+    set: &[Setting],
     validate: impl FnOnce(&T) -> Result<(), TrainingError>,
 ) -> Result<T, TrainingError> {
-    let config: T = read_toml(path)?;
-    validate(&config)
-        .map_err(|e| TrainingError::ConfigFile { path: path.to_owned(), problem: e.to_string() })?;
+    let config: T = read_settings(file, set)?;
+    validate(&config).map_err(|e| match file {
+        Some(path) => TrainingError::ConfigFile { path: path.to_owned(), problem: e.to_string() },
+        None => e,
+    })?;
     Ok(config)
 }
 

@@ -8,6 +8,7 @@ use crate::environment::parking_env::EnvConfig;
 use crate::lab::rl::sac::SacConfig;
 use crate::lab::training::TrainingError;
 use crate::lab::training::settings::{self, check, real, whole};
+use crate::toml_file::Setting;
 use crate::vehicle::Vehicle;
 use crate::world::generate::GeneratorConfig;
 
@@ -62,9 +63,10 @@ impl Default for RlConfig {
 }
 
 impl RlConfig {
-    /// Reads and checks a TOML file; absent settings keep their defaults.
-    pub fn read(path: &Path) -> Result<Self, TrainingError> {
-        settings::read(path, Self::validate)
+    /// Reads a TOML file, or the defaults, with the settings of `set` instead of theirs, and checks
+    /// them; absent settings keep their defaults.
+    pub fn read(file: Option<&Path>, set: &[Setting]) -> Result<Self, TrainingError> {
+        settings::read(file, set, Self::validate)
     }
 
     /// Checks every setting.
