@@ -10,7 +10,8 @@
 //! theirs without having tried.
 //!
 //! Columns: share of the mean time of `ha-rs` that is saved; how often no pose does without a search
-//! (*searched*, of the oracle); cost over that of `ha-rs` (*cost*, mean, of the oracle).
+//! (*searched*, of the oracle); cost over that of `ha-rs`, where that has a path (*cost*, mean, of the
+//! oracle).
 
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
@@ -99,7 +100,7 @@ fn line(
     poses: &[Pose],
     planners: &mut [Box<dyn Planner + Send>],
 ) -> anyhow::Result<String> {
-    let (mut times, mut searched, mut costs) = ([0.0; 4], 0, 0.0);
+    let (mut times, mut searched, mut costs) = ([0.0; 4], 0, Vec::new());
     for Case { scene, .. } in cases {
         let problem = Problem::new(scene)?;
         let mut cost_of = [0.0; 2];
@@ -114,11 +115,14 @@ fn line(
         });
         times[3] += time;
         searched += usize::from(result.expansions > 0);
-        costs += cost(&problem, &result) / cost_of[0];
+        let ratio = cost(&problem, &result) / cost_of[0];
+        if ratio.is_finite() {
+            costs.push(ratio);
+        }
     }
     let saved = |time: f64| format!("{:.0} %", 100.0 - 100.0 * time / times[0]);
     let [_, knn, mlp, oracle] = times.map(saved);
-    let cost = costs / cases.len() as f64;
+    let cost = costs.iter().sum::<f64>() / costs.len() as f64;
     Ok(format!("| {oracle} | {knn} | {mlp} | {searched} of {} | {cost:.2} |", cases.len()))
 }
 

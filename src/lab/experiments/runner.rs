@@ -404,7 +404,15 @@ impl Runner<'_> {
         let folder = self.given.models.as_ref().unwrap_or(&made);
         let mut files = Vec::new();
         if self.config.plans_with_models() {
-            files.push(folder.join("knn.bin"));
+            // Angled bays have a file of their own where models are given.
+            let angled = folder.join("knn-angled.bin");
+            let is_angled = |kind: &ParkingType| *kind == ParkingType::Angled;
+            let kinds = &self.config.evaluate.types;
+            let is_apart = kinds.iter().any(is_angled) && angled.exists();
+            if !(is_apart && kinds.iter().all(is_angled)) {
+                files.push(folder.join("knn.bin"));
+            }
+            files.extend(is_apart.then_some(angled));
         }
         if self.config.needs_mlp() {
             let network = |kind| folder.join(format!("mlp-{kind}.safetensors"));

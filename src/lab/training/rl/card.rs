@@ -17,7 +17,10 @@ pub(super) fn card(out: &Path, log: &RlLog) -> String {
             "abstracted environments: a lane and a spot, walls around, sizes and starts drawn as \
              the scene generator draws them for its levels"
         }
-        Course::Eval => "scenes of the generator that evaluates, of other seeds",
+        Course::Eval => {
+            "generated scenes of other seeds than those that evaluate: half of them like those, half with \
+             sizes drawn far wider"
+        }
     };
     let mut validation = String::new();
     for kind in ParkingType::SQUARE {
