@@ -8,7 +8,7 @@ use crate::planners::library::{Library, LibraryPlan};
 use crate::planners::{Effort, Guidance, Problem, Route};
 use crate::vehicle::Gear;
 use crate::world::abstraction::abstractions;
-use crate::world::cell::Grid;
+use crate::world::cell::{Axis, Grid};
 use crate::world::{ParkingType, Stance};
 
 /// Libraries kept prepared: those of the parking types of two vehicles, or of one with two margins,
@@ -38,6 +38,9 @@ const INTO_A_BAY: usize = 2;
 /// Where the lane begins farther out than this beyond a usual spot's, metres for the default vehicle,
 /// manoeuvres are tried that end farther out, too.
 const DEEPER: f64 = 0.3;
+/// Shorter parallel spots than this are unusual, metres for the default vehicle: manoeuvres were learnt
+/// for all others (see [`wide`](crate::world::generate::wide)).
+const LEAST_GAP: f64 = 5.8;
 /// Those that it tries to join by a long way round, where no other plan was found.
 const LONG_WAYS: usize = 8;
 
@@ -89,7 +92,9 @@ impl<'a> Standard<'a> {
         let problem = self.problem;
         let scale = problem.vehicle.scale();
         let has_cell = |stance| {
-            let grid = Grid::default().scaled(scale);
+            let usual = Grid::default();
+            let parallel_spot_width = Axis { min: LEAST_GAP, ..usual.parallel_spot_width };
+            let grid = Grid { parallel_spot_width, ..usual }.scaled(scale);
             !abstractions(&problem.obstacles, stance, &grid).is_empty()
         };
         let unusual = |stance| problem.mouth > DEEPER * scale || !has_cell(stance);
