@@ -30,18 +30,18 @@
 //!
 //! - `rng` (feature `generate`): one seed, many named random streams
 //! - [`files`]: files that are whole or absent, and plain words for what fails
+//! - `toml_file` (feature `scene`): files of settings
 //! - [`geometry`]: poses, frames, polygons
 //! - [`vehicle`]: dimensions, footprint, kinematics
 //! - [`curves`]: segments, paths, Reeds-Shepp words
-//! - [`world`]: scenes, exact swept collision, cells, the abstraction, the generator
+//! - [`world`]: scenes, exact swept collision, cells, the abstraction, generators (feature `generate`)
 //! - [`planners`]: the `Planner` trait and Hybrid A* with Reeds-Shepp expansion
-//! - [`selectors`]: preparatory poses by KNN and MLP
+//! - [`selectors`]: preparatory poses and manoeuvres: by KNN, by MLP, across vehicles
 //! - [`mod@n3p`]: N3P itself, every method by name, and the models that serve a vehicle
 //! - [`output`]: path and trajectory files, pictures
 //! - [`episode`]: one method on one scene, timed and checked
 //! - `environment` (feature of that name): what policies see, do and learn in
 //! - `lab` (feature of that name): what learns and compares: policies, data, training, evaluation, experiments
-//! - `toml_file` (feature `scene`): files of settings
 //! - `cli` (feature `plan`): arguments, output and exit codes of the binaries
 
 #![warn(missing_docs)]

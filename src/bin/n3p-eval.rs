@@ -31,11 +31,12 @@ struct Args {
     models: Vec<String>,
     #[command(flatten)]
     policy: PolicyArgs,
-    /// Parking type [default: all that the models know].
+    /// Parking type [default: all that the models of the methods know; all where none needs a model].
     #[arg(long = "type", value_enum, value_name = "TYPE")]
     kind: Option<ParkingType>,
-    /// Where generated scenes lie: "home", parking lots as in the paper; "lots", whole car parks and
-    /// streets, for which nothing is trained. May be given several times [default: home].
+    /// Where generated scenes lie: "home", parking lots as in the paper; "wide", the same with sizes
+    /// drawn far wider; "lots", whole car parks and streets, for which nothing is trained or chosen.
+    /// May be given several times [default: home].
     #[arg(long = "world", value_enum, value_name = "WORLD", conflicts_with = "scenes")]
     worlds: Vec<World>,
     /// Difficulty of the generated scenes at home [default: all].

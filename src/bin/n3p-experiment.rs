@@ -57,8 +57,8 @@ struct GivenArgs {
     /// Data set to train from instead of collecting one; it must have the experiment's settings
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Folder of models to evaluate instead of collecting and training: knn.bin,
-    /// mlp-TYPE.safetensors, rl-ENV.safetensors
+    /// Folder of models to evaluate instead of collecting and training: knn.bin
+    /// (knn-angled.bin for angled bays), mlp-TYPE.safetensors, rl-ENV.safetensors
     #[arg(long, value_name = "DIR", conflicts_with = "data")]
     models: Option<PathBuf>,
     /// Folder of policies (rl-ENV.safetensors) to evaluate instead of training them, where the

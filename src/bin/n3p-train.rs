@@ -134,7 +134,7 @@ struct RlArgs {
     /// Settings of the training, a TOML file; the defaults when omitted
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// A setting instead of the file's, such as sac.gamma=0.99; may be given several times
+    /// A setting instead of the file's, such as sac.discount=0.99; may be given several times
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Setting>,
     /// Go on from the checkpoint beside the policy file, if there is one

@@ -5,7 +5,10 @@
 //! manoeuvres the selector knows are ranked, and the first that is free and that a free curve
 //! joins is the plan, without any search. Where the first few cannot be joined, the curve straight
 //! to the goal is one more way. Where there is none, several poses of the selector are tried, then
-//! one search goes to the goal or any of these poses.
+//! one search goes to the goal or any of these poses. Who starts within a manoeuvre may drive its rest.
+//! What passes something near, or costs more than usual for its spot and its changes of gear, is refined.
+//! What then still costs more than twice the estimate, by an unusual spot or with more changes than
+//! usual, is searched for once more.
 //! Either way the path leaves certified by the exact swept check.
 
 use std::sync::Arc;

@@ -37,8 +37,10 @@ impl Default for Budget {
 pub enum Effort {
     /// The first path is the answer, as it was found.
     First,
-    /// A path that costs more than usual has its corners cut, and some hundred expansions look for
-    /// something cheaper: twice as many as the path took where that is more.
+    /// Corners of a searched path are cut, and where it still costs more than 1.1 times what any path
+    /// must, 400 expansions look for something cheaper, or twice as many as it took where that is more.
+    /// A path known without a search is treated so only where it costs more than usual or passes
+    /// something near, with 120 expansions.
     #[default]
     Usual,
     /// Every path that costs more than it must, obstacles aside, is looked at again, with half of

@@ -75,11 +75,12 @@ pub enum SuiteError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum World {
-    /// Parking lots as in the paper, of three levels: what methods are trained and tuned for.
+    /// Parking lots as in the paper, of three levels: those of the tables.
     Home,
-    /// As at home, with sizes drawn far wider than those of any level: what methods are chosen by.
+    /// As at home, with sizes drawn far wider than those of any level: what methods learn in and, of
+    /// other seeds, are chosen by.
     Wide,
-    /// Whole car parks and streets, for which nothing is trained or tuned.
+    /// Whole car parks and streets, for which nothing is trained or chosen.
     Lots,
 }
 

@@ -55,7 +55,7 @@ pub struct KnnKindLog {
     pub kind: ParkingType,
     /// Rows of the data set.
     pub rows: usize,
-    /// Rows stored: solved ones.
+    /// Rows stored: solved ones, the first `samples_per_cell` of each cell.
     pub samples: usize,
     /// Rows solved, where not all of them are stored.
     #[serde(default, skip_serializing_if = "Option::is_none")]

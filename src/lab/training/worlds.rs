@@ -78,9 +78,9 @@ pub(super) struct Worlds<'a> {
 }
 
 impl Worlds<'_> {
-    /// What is worth knowing of `manoeuvres` and of those of these worlds for spots in which the car stands
-    /// so, in the units of the `sources`; what is used most comes first. The worlds are divided among the
-    /// sources' vehicles. Without a world all stays as it is.
+    /// What is worth keeping of `manoeuvres` and of those learnt here, for spots in which the car stands as
+    /// in `stance`; lengths in the sources' units, the most used first. World by world the sources'
+    /// vehicles take turns. With no worlds, `manoeuvres` come back as they are.
     pub fn learn(
         &self,
         stance: Stance,
@@ -111,8 +111,8 @@ impl Worlds<'_> {
         order.into_iter().map(|i| std::mem::take(&mut manoeuvres[i])).collect()
     }
 
-    /// Calls `each` with the number of a source and a world for its vehicle, turn by turn. An angled bay's
-    /// is a world of the stance of the grid that is nearest.
+    /// Calls `each` for every world of `stance`, with the source whose vehicle it is for. A world with an
+    /// angled bay counts for the nearest of the grid's stances only.
     fn for_each(&self, stance: Stance, sources: &[Source], mut each: impl FnMut(usize, &Problem)) {
         for index in 0..self.config.count {
             let at = index as usize % sources.len();

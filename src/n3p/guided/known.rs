@@ -27,8 +27,8 @@ const TRIES: usize = 64;
 /// of joints and obstacles) or the least cost through empty space is taken as it is, unless it
 /// passes something near on its way.
 const USUAL: f64 = 1.3;
-/// What costs more than this many times the estimate is looked at again, by the changes it takes: see
-/// [`dear`]; and by a spot that no usual cell stands for.
+/// Further limits of the same kind, for plans with changes of gear: see [`dear`]. The last is also the
+/// limit by a spot that no usual cell stands for.
 const RATHER_DEAR: f64 = 1.6;
 const DEAR: f64 = 3.0;
 pub(super) const DEAR_BY_UNUSUAL: f64 = 2.0;
@@ -256,9 +256,9 @@ impl GuidedPlanner {
         self.libraries[0].straights > 0
     }
 
-    /// Whether a plan costs no more than usual: what is known of the spot says what it takes, by a plan of
-    /// the usual changes within wide limits, as manoeuvres for it were learnt in many worlds; where that is
-    /// little, the curve through empty space does.
+    /// Whether a plan costs no more than usual: little more than the least through empty space, or no more
+    /// than [`dear`] allows over the library's estimate. With the usual changes of gear that is much,
+    /// since manoeuvres for them were learnt in many worlds; by an unusual spot it is at most twice.
     pub(super) fn is_usual(&mut self, known: &Known, standard: &mut Standard) -> bool {
         if known.cost <= standard.enough(&mut self.hars) {
             return true;

@@ -1,7 +1,7 @@
 //! Whole car parks and streets: the generator *away*.
 //!
-//! Methods are trained, condensed and tuned on the scenes of [`generate`](super::generate), *home*;
-//! nothing is on these, so that they say how a method does in places it was not made for. They are
+//! Methods learn in cells and in scenes of [`generate`](super::generate), *home* and *wide*, and are
+//! chosen by *wide*; nothing is by these, so that they say how a method does in places it was not made for. They are
 //! laid out by other principles: not one spot with its neighbours, but lanes with rows on both
 //! sides, then one free spot among them. Spots and cars have the sizes that they have in reality.
 //!

@@ -23,6 +23,10 @@ pub(in crate::lab::training) fn knn(out: &Path, metadata: &Metadata, log: &KnnLo
         let (occupied, cells) = (k.occupied_cells, k.cells);
         let _ = writeln!(stored, "| {kind} | {samples} | {occupied} of {cells} | {manoeuvres} |");
     }
+    let rows = match log.kinds.iter().any(|k| k.solved.is_some()) {
+        true => "The first solved rows of each cell",
+        false => "Every solved row",
+    };
     let learnt = in_worlds(&log.worlds);
     let judged =
         |k: &KnnKindLog| k.leave_one_out.map(|l| (k.kind, l.reach.rows, l.errors, l.reach));
@@ -68,7 +72,7 @@ are compared as points (x, y, r·cos θ, r·sin θ) with r = {radius:.4} m: half
 {data}
 ## What is stored
 
-Every solved row, and manoeuvres: {bytes} bytes ({mebibytes:.2} MiB). {learnt}
+{rows}, and manoeuvres: {bytes} bytes ({mebibytes:.2} MiB). {learnt}
 
 | type | samples | cells with samples | manoeuvres |
 |---|--:|--:|--:|
