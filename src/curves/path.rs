@@ -38,6 +38,8 @@ impl Path {
 
     /// Appends `segments`, joining and dropping as [`Path::new`] does.
     pub fn extend(&mut self, segments: impl IntoIterator<Item = Segment>) {
+        let segments = segments.into_iter();
+        self.segments.reserve(segments.size_hint().0);
         for s in segments {
             if s.length.abs() < 1e-9 {
                 continue;

@@ -361,8 +361,8 @@ impl LookUp<'_> {
             problem,
             model,
         )?;
-        let mut path = Path::new(problem.start, word.segments().iter().copied());
-        path.extend(entry.rest.iter().copied());
+        let segments = word.segments().iter().chain(&entry.rest).copied();
+        let path = Path::new(problem.start, segments);
         Some(LibraryPlan { path, cost: cost + entry.cost(), manoeuvre, preparatory })
     }
 }

@@ -282,7 +282,8 @@ impl<'a> Near<'a> {
         let floor = -(half_depth + slanted);
         let top = boundary + MAX_SHIFT * grid.bay_depth + grid.lane_width.max;
         let is_near = |(a, b): &(Vec2, Vec2)| a.y.max(b.y) > floor && a.y.min(b.y) < top;
-        let edges = all.edges.iter().copied().filter(is_near).collect();
+        let mut edges = Vec::with_capacity(all.edges.len());
+        edges.extend(all.edges.iter().copied().filter(is_near));
         Self { edges, stance, grid, half_depth, boundary }
     }
 

@@ -181,13 +181,13 @@ enum Demand {
 /// usual, and any other's lane is clearly smaller.
 fn found(scene: &Scene, kinds: &[ParkingType], precision: Precision) -> Option<Found> {
     let near = around_goal(scene, precision);
-    let (angled, square): (Vec<_>, Vec<_>) = kinds.iter().partition(|k| **k == ParkingType::Angled);
-    let likeliest = |demand| likeliest(scene, &near, &square, demand);
+    let likeliest = |demand| likeliest(scene, &near, kinds, demand);
     if let Some(usual) = likeliest(Demand::Usual) {
         return Some(usual);
     }
     let square = likeliest(Demand::FartherOut).or_else(|| likeliest(Demand::Least));
-    let angled = angled.first().and_then(|_| angled::found(scene, &near));
+    let may_be_angled = kinds.contains(&ParkingType::Angled);
+    let angled = may_be_angled.then(|| angled::found(scene, &near)).flatten();
     match (square, angled) {
         (Some(square), Some(angled)) if angled.size > CLEARLY * square.size => Some(angled),
         (square, angled) => square.or(angled),
@@ -197,6 +197,7 @@ fn found(scene: &Scene, kinds: &[ParkingType], precision: Precision) -> Option<F
 /// An angled bay's lane must be so many times as large as that of an unusual square spot to count.
 const CLEARLY: f64 = 1.25;
 
+/// The likeliest of those that are not angled.
 fn likeliest(
     scene: &Scene,
     near: &Surroundings,
@@ -218,7 +219,8 @@ fn likeliest(
         })
     };
     let mut best: Option<((bool, f64), Found)> = None;
-    for (merit, found) in kinds.iter().filter_map(of_kind) {
+    let square = kinds.iter().filter(|k| **k != ParkingType::Angled);
+    for (merit, found) in square.filter_map(of_kind) {
         if best.is_none_or(|(most, _)| merit > most) {
             best = Some((merit, found));
         }

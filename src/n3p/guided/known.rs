@@ -260,7 +260,7 @@ impl GuidedPlanner {
     /// than [`dear`] allows over the library's estimate. With the usual changes of gear that is much,
     /// since manoeuvres for them were learnt in many worlds; by an unusual spot it is at most twice.
     pub(super) fn is_usual(&mut self, known: &Known, standard: &mut Standard) -> bool {
-        if known.cost <= standard.enough(&mut self.hars) {
+        if known.cost <= USUAL * known.least || known.cost <= standard.enough(&mut self.hars) {
             return true;
         }
         let times = known.cost / known.least.max(standard.least(&mut self.hars));
