@@ -105,7 +105,7 @@ def test_vehicles_are_values():
 def test_rows_are_columns():
     scenes = n3p.generate("reverse", "easy", 4) + [n3p.load_scene(REVERSE)]
     rows = n3p.evaluate(scenes, ["n3p", "ha-rs", "sha"])
-    assert list(rows)[:5] == ["scene", "type", "level", "method", "ok"] and len(rows) == 19
+    assert list(rows)[:5] == ["scene", "type", "level", "method", "ok"] and len(rows) == 20
     assert {column.shape for column in rows.values()} == {(15,)}
     assert rows["method"].tolist() == ["n3p", "ha-rs", "sha"] * 5
     fine = rows["method"] != "sha"
