@@ -244,6 +244,17 @@ fn one_file_holds_all_types_and_the_same_input_gives_the_same_bytes() {
     assert!(matches!(error, Err(TrainingError::NoSamples(ParkingType::Forward))));
 }
 
+/// A network would answer the same for bays of any slant.
+#[test]
+fn networks_are_not_trained_for_angled_bays() {
+    let dir = tempfile::tempdir().unwrap();
+    let (kind, path) = (ParkingType::Angled, dir.path().join("mlp.safetensors"));
+    let all = samples(kind, &[0, 1], 20, 5);
+    let error = training::mlp::train(&metadata(), &all, kind, &quick(1), &path).unwrap_err();
+    assert!(matches!(error, TrainingError::NoNetwork(ParkingType::Angled)), "{error}");
+    assert!(!path.exists());
+}
+
 /// Whoever learns in worlds knows more, whatever the order of rows, and what is used most comes first.
 #[test]
 fn manoeuvres_are_learnt_in_worlds() {

@@ -39,6 +39,15 @@ fn every_world_has_its_files() {
 }
 
 #[test]
+fn a_type_that_a_world_has_not_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    generate_in(dir.path(), "--world bays --type angled --count 2 --seed 3 --out o")
+        .code(2)
+        .stderr(contains("--type: the world bays has no scenes of that type"));
+    assert!(!dir.path().join("o").exists());
+}
+
+#[test]
 fn types_levels_vehicle_and_hint_are_chosen() {
     let dir = tempfile::tempdir().unwrap();
     let vehicle = Vehicle { length: 4.7, ..Vehicle::default() };

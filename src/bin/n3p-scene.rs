@@ -80,6 +80,10 @@ fn main() -> ExitCode {
 
 fn write(args: &Generate) -> Result<ExitCode> {
     let scenes = scenes(args)?;
+    if scenes.is_empty() {
+        let text = "--type: the world bays has no scenes of that type; leave it out";
+        return Err(BadInput(text.to_owned()).into());
+    }
     let names: Vec<String> = scenes.iter().map(|s| format!("{}.json", s.file_stem())).collect();
     prepare(&args.out, &names)?;
     for (mut scene, name) in scenes.into_iter().zip(&names) {

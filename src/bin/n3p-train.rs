@@ -91,7 +91,8 @@ struct KnnArgs {
     #[arg(long, value_name = "S")]
     seed: Option<u64>,
     /// Samples stored of each cell, at most; the manoeuvres are learnt from all
-    #[arg(long, value_name = "N", default_value_t = u32::MAX, hide_default_value = true)]
+    #[arg(long, value_name = "N", default_value_t = u32::MAX, hide_default_value = true,
+        value_parser = clap::value_parser!(u32).range(1..))]
     samples_per_cell: u32,
 }
 
@@ -169,6 +170,7 @@ fn mlp(args: &MlpArgs) -> anyhow::Result<ExitCode> {
         artefact::check_writable(&out(kind)).or_bad_input()?;
     }
     let (data, kinds) = read(&args.common)?;
+    kinds.iter().try_for_each(|&kind| training::mlp::check_kind(kind)).or_bad_input()?;
     for kind in kinds {
         let out = out(kind);
         let (metadata, samples) = (&data.metadata, &data.samples);

@@ -52,6 +52,14 @@ pub struct TrainingLog {
     pub reach: Reach,
 }
 
+/// Whether there are networks for a parking type: not for angled bays, whose slant no feature tells.
+pub fn check_kind(kind: ParkingType) -> Result<(), TrainingError> {
+    match kind {
+        ParkingType::Angled => Err(TrainingError::NoNetwork(kind)),
+        _ => Ok(()),
+    }
+}
+
 /// Trains a network of `kind` and writes it to `out`, with its log, its model card and the
 /// loss curve (`.training.svg`) beside it.
 pub fn train(
@@ -62,6 +70,7 @@ pub fn train(
     out: &Path,
 ) -> Result<TrainingLog, TrainingError> {
     config.validate()?;
+    check_kind(kind)?;
     let solved = solved(samples, kind, metadata.grid.cell_count(kind))?;
     if solved.is_empty() {
         return Err(TrainingError::NoSamples(kind));
