@@ -37,18 +37,25 @@ impl Segment {
     pub fn at(self, start: Pose, s: f64) -> Pose {
         let turn = self.curvature * s;
         let (sin, cos) = start.sin_cos();
-        let (forward, left) = if turn.abs() > 1e-6 {
-            let (st, ct) = turn.sin_cos();
-            (st / self.curvature, (1.0 - ct) / self.curvature)
-        } else {
-            // Series of sin(κs)/κ and (1 − cos κs)/κ: exact to 1e-12 here.
-            (s * (1.0 - turn * turn / 6.0), s * turn / 2.0)
-        };
+        let [forward, left] = self.way(s, turn.sin_cos());
         Pose::new(
             start.x + forward * cos - left * sin,
             start.y + forward * sin + left * cos,
             start.heading + turn,
         )
+    }
+
+    /// Where the signed arc length `s` leads, seen from the start: metres ahead and to the left.
+    /// `turned`: sine and cosine of the turn on the way.
+    pub(crate) fn way(self, s: f64, turned: (f64, f64)) -> [f64; 2] {
+        let turn = self.curvature * s;
+        if turn.abs() > 1e-6 {
+            let (sin, cos) = turned;
+            [sin / self.curvature, (1.0 - cos) / self.curvature]
+        } else {
+            // Series of sin(κs)/κ and (1 − cos κs)/κ: exact to 1e-12 here.
+            [s * (1.0 - turn * turn / 6.0), s * turn / 2.0]
+        }
     }
 
     /// The same motion driven in the opposite direction.

@@ -182,20 +182,19 @@ impl CollisionWorld {
         segments: &[Segment],
     ) -> bool {
         // More than a curve has: those beyond are checked in driving order.
-        let mut starts = [Pose::default(); 8];
+        let mut frame = BodyFrame::new(start);
+        let mut starts = [frame; 8];
         let (segments, beyond) = segments.split_at(segments.len().min(starts.len()));
-        let mut pose = start;
         for (slot, s) in starts.iter_mut().zip(segments) {
-            *slot = pose;
-            pose = s.end(pose);
+            *slot = frame;
+            frame = frame.after(*s);
         }
         let legs = starts.iter().zip(segments);
-        let mut is_free = |(&from, &s): (&Pose, &Segment)| {
-            let sweep = Sweep::new(&self.footprint, s);
-            self.sweep_is_free_of(suspect, &BodyFrame::new(from), &sweep)
+        let mut is_free = |(from, &s): (&BodyFrame, &Segment)| {
+            self.sweep_is_free_of(suspect, from, &Sweep::new(&self.footprint, s))
         };
         legs.rev().all(&mut is_free)
-            && (beyond.is_empty() || self.segments_are_free_of(suspect, pose, beyond))
+            && (beyond.is_empty() || self.segments_are_free_of(suspect, frame.pose, beyond))
     }
 
     /// Whether the whole path, its start included, touches nothing.
@@ -240,6 +239,13 @@ impl BodyFrame {
             sin: self.sin * other.cos + self.cos * other.sin,
             cos: self.cos * other.cos - self.sin * other.sin,
         }
+    }
+
+    /// The frame after a segment is driven from here.
+    fn after(&self, segment: Segment) -> Self {
+        let (sin, cos) = segment.turn().sin_cos();
+        let [ahead, left] = segment.way(segment.length, (sin, cos));
+        self.compose(&Self { pose: Pose::new(ahead, left, segment.turn()), sin, cos })
     }
 
     /// A point of the planning frame, seen from the vehicle.
