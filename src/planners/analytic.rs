@@ -11,7 +11,7 @@ use std::collections::BinaryHeap;
 use crate::curves::Segment;
 use crate::curves::reeds_shepp::{self, Word};
 use crate::geometry::Pose;
-use crate::vehicle::Vehicle;
+use crate::vehicle::{Gear, Vehicle};
 
 use crate::world::collision::Contact;
 
@@ -408,13 +408,26 @@ pub(super) fn least_curve_cost(
     model: &CostModel,
     words: &mut Vec<Word>,
 ) -> f64 {
+    least_curve_cost_before(None, from, to, vehicle, model, words)
+}
+
+/// [`least_curve_cost`] where the way goes on in a gear.
+pub(super) fn least_curve_cost_before(
+    gear: Option<Gear>,
+    from: Pose,
+    to: Pose,
+    vehicle: &Vehicle,
+    model: &CostModel,
+    words: &mut Vec<Word>,
+) -> f64 {
     words.clear();
     reeds_shepp::words(from, to, vehicle.turning_radius(), words);
     // Straightening the wheels at the start is not charged: a lower bound for any state.
     let costs = words.iter().map(|w| {
         let steer =
             w.segments().first().map_or(0.0, |s| vehicle.max_steer * sign_or_zero(s.curvature));
-        curve_cost(w, DriveState { gear: None, steer }, vehicle, model).0
+        let (cost, arrival) = curve_cost(w, DriveState { gear: None, steer }, vehicle, model);
+        cost + model.change(arrival, DriveState { gear, ..arrival })
     });
     costs.fold(f64::INFINITY, f64::min)
 }

@@ -9,9 +9,9 @@ use std::f64::consts::TAU;
 
 use crate::curves::reeds_shepp::Word;
 use crate::geometry::Pose;
-use crate::vehicle::Vehicle;
+use crate::vehicle::{Gear, Vehicle};
 
-use super::analytic::least_curve_cost;
+use super::analytic::least_curve_cost_before;
 use super::cost::CostModel;
 
 /// The table's steps: 1 m (for the default vehicle; scaled for others), so that a position's bin
@@ -22,6 +22,8 @@ const HEADINGS: f32 = 24.0;
 const REACH: f32 = 32.0;
 /// Bins along x.
 const SIDE: f32 = 2.0 * REACH + 1.0;
+/// What a way may go on in: nothing, where it ends, or a gear. A table for each.
+const GEARS: [Option<Gear>; 3] = [None, Some(Gear::Forward), Some(Gear::Backward)];
 const ENTRIES: usize = (SIDE * (REACH + 1.0) * HEADINGS) as usize;
 
 /// Poses in one frame, each with a cost of going on from there.
@@ -32,14 +34,17 @@ pub(super) struct Poses {
     /// Headings in steps of the table.
     turn: Vec<f32>,
     cost: Vec<f32>,
+    /// The gear of going on: which of the tables.
+    gear: Vec<u8>,
 }
 
 impl Poses {
-    pub fn push(&mut self, pose: Pose, cost: f64) {
+    pub fn push(&mut self, pose: Pose, cost: f64, gear: Option<Gear>) {
         self.x.push(pose.x as f32);
         self.y.push(pose.y as f32);
         self.turn.push(steps(pose.heading));
         self.cost.push(cost as f32);
+        self.gear.push(GEARS.iter().position(|g| *g == gear).unwrap_or(0) as u8);
     }
 }
 
@@ -79,7 +84,7 @@ impl Approaches {
         if self.made_for != Some((*vehicle, *model)) {
             self.made_for = Some((*vehicle, *model));
             self.table.clear();
-            self.table.resize(ENTRIES, f32::NAN);
+            self.table.resize(GEARS.len() * ENTRIES, f32::NAN);
         }
         let (sin, cos) = frame.sin_cos();
         let (sin, cos) = (sin as f32, cos as f32);
@@ -103,30 +108,39 @@ impl View<'_> {
     /// Estimated cost from the start by way of pose `index`.
     #[inline]
     pub fn cost(&mut self, index: usize) -> f32 {
-        let stored = self.table.get(self.entries[index] as usize).copied().unwrap_or(f32::NAN);
+        let entry = self.entries[index] as usize;
+        let stored = if entry < ENTRIES { self.table[self.at(index)] } else { f32::NAN };
         let approach = if stored.is_nan() { self.compute(index) } else { stored };
         self.poses.cost[index] + approach
+    }
+
+    /// Where the table of the pose's gear has its bin.
+    #[inline]
+    fn at(&self, index: usize) -> usize {
+        usize::from(self.poses.gear[index]) * ENTRIES + self.entries[index] as usize
     }
 
     /// The least cost to the middle of the pose's bin, which is kept, or to a far pose.
     #[cold]
     fn compute(&mut self, index: usize) -> f32 {
-        let entry = self.entries[index] as usize;
-        let mut least =
-            |to| least_curve_cost(Pose::default(), to, self.vehicle, self.model, self.words) as f32;
-        let Some(stored) = self.table.get_mut(entry) else {
-            let Poses { x, y, turn, .. } = self.poses;
+        let (entry, at) = (self.entries[index] as usize, self.at(index));
+        let Poses { x, y, turn, gear, .. } = self.poses;
+        let (gear, from) = (GEARS[usize::from(gear[index])], Pose::default());
+        let mut least = |to| {
+            least_curve_cost_before(gear, from, to, self.vehicle, self.model, self.words) as f32
+        };
+        if entry >= ENTRIES {
             let heading = f64::from(turn[index] / HEADINGS) * TAU;
             return least(self.frame.compose(Pose::new(x[index].into(), y[index].into(), heading)));
-        };
+        }
         let (headings, side) = (HEADINGS as usize, SIDE as usize);
         let position = entry / headings;
-        *stored = least(Pose::new(
+        self.table[at] = least(Pose::new(
             ((position % side) as f64 - f64::from(REACH)) * self.step,
             (position / side) as f64 * self.step,
             (entry % headings) as f64 / headings as f64 * TAU,
         ));
-        *stored
+        self.table[at]
     }
 }
 
@@ -174,14 +188,17 @@ mod tests {
         let mut rng = rng(5, Stream::Start, 0);
         let mut r = |a: f64| rng.random_range(-a..a);
         let mut words = Vec::new();
-        let mut cost = |to| least_curve_cost(Pose::default(), to, &vehicle, &model, &mut words);
+        let mut cost = |gear, to| {
+            least_curve_cost_before(gear, Pose::default(), to, &vehicle, &model, &mut words)
+        };
         let mut approaches = Approaches::default();
         let (mut near, mut far) = (0, 0);
         for _ in 0..50 {
             let frame = Pose::new(r(30.0), r(30.0), r(9.0));
             let given: Vec<Pose> = (0..20).map(|_| Pose::new(r(9.0), r(9.0), r(9.0))).collect();
             let mut poses = Poses::default();
-            given.iter().for_each(|&p| poses.push(p, 1.0));
+            let gear = |i: usize| GEARS[i % GEARS.len()];
+            (0..).zip(&given).for_each(|(i, &p)| poses.push(p, 1.0, gear(i)));
             let mut view = approaches.view(&poses, frame, &vehicle, &model);
             for (i, &pose) in given.iter().enumerate() {
                 let p = frame.compose(pose);
@@ -194,7 +211,7 @@ mod tests {
                 }
                 let inside = middle.x.abs() <= 32.0 && middle.y.abs() <= 32.0;
                 *(if inside { &mut near } else { &mut far }) += 1;
-                let expected = 1.0 + cost(if inside { middle } else { p });
+                let expected = 1.0 + cost(gear(i), if inside { middle } else { p });
                 for _ in 0..2 {
                     let got = f64::from(view.cost(i));
                     assert!((got - expected).abs() < 1e-3, "{p:?}: {got}, not {expected}");

@@ -11,7 +11,7 @@ use crate::vehicle::Vehicle;
 
 /// A car this near to a pose of a manoeuvre stands within it, metres: distance, and turn at full
 /// lock. Poses are looked at so far apart along it. Both for the default vehicle.
-const BESIDE: f64 = 0.4;
+pub(super) const BESIDE: f64 = 0.4;
 const STRIDE: f64 = 0.25;
 /// Newton's steps to the pose beside the start.
 const STEPS_BESIDE: usize = 4;
@@ -20,13 +20,43 @@ const STEPS_BESIDE: usize = 4;
 const NEAR_RESTS: usize = 50;
 const RESTS: usize = 3;
 
-/// Which manoeuvres of a library pass where, seen from the goal.
+/// Where the manoeuvres of a library pass, seen from the goal.
 #[derive(Clone, Debug)]
 pub(super) struct Passages {
-    /// A box of poses and a manoeuvre that passes through it, in ascending order: see
-    /// [`Boxes::number`].
-    passages: Vec<u64>,
+    /// In ascending order of boxes.
+    passages: Vec<Passage>,
     boxes: Boxes,
+}
+
+/// A manoeuvre that passes through a box of poses.
+#[derive(Clone, Copy, Debug)]
+struct Passage {
+    /// See [`Boxes::number`].
+    number: u32,
+    manoeuvre: u32,
+    place: Place,
+}
+
+/// A pose along a manoeuvre. There are tens of thousands, and little is needed of each: single
+/// precision will do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Place {
+    /// The number of the motion.
+    motion: u32,
+    /// How much of it is driven, metres.
+    driven: f32,
+    x: f32,
+    y: f32,
+    heading: f32,
+}
+
+impl Place {
+    /// Distance from a pose, and the turn to its heading at full lock, metres.
+    fn apart(&self, pose: Pose, radius: f64) -> f64 {
+        let [x, y] = [pose.x - f64::from(self.x), pose.y - f64::from(self.y)];
+        let turn = signed_angle(f64::from(self.heading), pose.heading).abs();
+        (x * x + y * y).sqrt() + turn * radius
+    }
 }
 
 /// Boxes of poses: as large as what is near to a pose, so that this lies in its box and those around.
@@ -51,10 +81,10 @@ impl Boxes {
         [place(pose.x), place(pose.y), turn]
     }
 
-    /// The number of a box, in the upper 32 bits. Boxes far away share some.
-    fn number(&self, [x, y, turn]: [i64; 3]) -> u64 {
-        let twelve = |v: i64| v as u64 & 0xfff;
-        (twelve(x) << 20 | twelve(y) << 8 | turn.rem_euclid(self.turns) as u64) << 32
+    /// The number of a box. Boxes far away share some.
+    fn number(&self, [x, y, turn]: [i64; 3]) -> u32 {
+        let twelve = |v: i64| v as u32 & 0xfff;
+        twelve(x) << 20 | twelve(y) << 8 | turn.rem_euclid(self.turns) as u32
     }
 }
 
@@ -62,29 +92,38 @@ impl Passages {
     pub(super) fn new(manoeuvres: &[Manoeuvre], vehicle: &Vehicle) -> Self {
         let boxes = Boxes::new(vehicle);
         let mut passages = Vec::new();
-        for (index, manoeuvre) in manoeuvres.iter().enumerate() {
-            let poses = manoeuvre.poses(vehicle.scale()).map(|(_, _, at)| at);
-            passages.extend(poses.map(|at| boxes.number(boxes.of(at)) | index as u64));
+        for (manoeuvre, passing) in (0..).zip(manoeuvres) {
+            passages.extend(passing.poses(vehicle.scale()).map(|(motion, driven, at)| {
+                let (number, driven) = (boxes.number(boxes.of(at)), driven as f32);
+                let [x, y, heading] = [at.x, at.y, at.heading].map(|v| v as f32);
+                let place = Place { motion: motion as u32, driven, x, y, heading };
+                Passage { number, manoeuvre, place }
+            }));
         }
-        passages.sort_unstable();
-        passages.dedup();
+        // Stable: in the order of driving within each box.
+        passages.sort_by_key(|p| (p.number, p.manoeuvre));
         Self { passages, boxes }
     }
 
-    /// Those that pass near a pose, in ascending order, and perhaps a few others.
-    pub(super) fn near(&self, pose: Pose) -> Vec<usize> {
+    /// The manoeuvres that pass near a pose, in ascending order, each with where it passes nearest.
+    pub(super) fn near(&self, pose: Pose, vehicle: &Vehicle) -> Vec<(usize, Place)> {
+        let (nearest, radius) = (BESIDE * vehicle.scale(), vehicle.turning_radius());
         let [x, y, turn] = self.boxes.of(pose);
-        let mut near = Vec::new();
+        let mut near: Vec<(u32, f64, Place)> = Vec::new();
         for beside in 0..27 {
             let (dx, dy, dt) = (beside / 9 - 1, beside / 3 % 3 - 1, beside % 3 - 1);
             let number = self.boxes.number([x + dx, y + dy, turn + dt]);
-            let from = self.passages.partition_point(|&p| p < number);
-            let here = self.passages[from..].iter().take_while(|&&p| p >> 32 == number >> 32);
-            near.extend(here.map(|&p| (p & 0xffff_ffff) as usize));
+            let from = self.passages.partition_point(|p| p.number < number);
+            for p in self.passages[from..].iter().take_while(|p| p.number == number) {
+                let apart = p.place.apart(pose, radius);
+                if apart < nearest {
+                    near.push((p.manoeuvre, apart, p.place));
+                }
+            }
         }
-        near.sort_unstable();
-        near.dedup();
-        near
+        near.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        near.dedup_by_key(|(manoeuvre, ..)| *manoeuvre);
+        near.into_iter().map(|(manoeuvre, _, place)| (manoeuvre as usize, place)).collect()
     }
 }
 
@@ -101,29 +140,21 @@ impl Manoeuvre {
         })
     }
 
-    /// What is left of it from where it passes nearest to `start`, if that is near; poses are seen from
+    /// What is left of it from beside `start`, near which it passes at `place`; poses are seen from
     /// the goal.
-    pub(super) fn rest(&self, start: Pose, vehicle: &Vehicle) -> Option<Path> {
-        let (scale, radius) = (vehicle.scale(), vehicle.turning_radius());
-        let motions = &self.entry.rest;
-        let (mut best, mut nearest) = (None, BESIDE * scale);
-        for (i, driven, at) in self.poses(scale) {
-            let turn = signed_angle(at.heading, start.heading).abs();
-            let apart = at.distance(start) + turn * radius;
-            if apart < nearest {
-                (best, nearest) = (Some((i, driven, at)), apart);
-            }
-        }
-        let (i, mut driven, mut at) = best?;
+    fn rest(&self, place: Place, start: Pose) -> Path {
+        let (motions, i) = (&self.entry.rest, place.motion as usize);
+        let (length, sign) = (motions[i].length.abs(), motions[i].gear().sign());
+        let mut driven = f64::from(place.driven);
+        let mut at = motions[i].at(self.begins[i], driven);
         // Right beside the start rather than a stride away: nothing is to be bent for who stands on it.
         for _ in 0..STEPS_BESIDE {
-            let ahead = at.point_to_local(start.position()).x * motions[i].gear().sign();
-            driven = (driven.abs() + ahead).clamp(0.0, motions[i].length.abs())
-                * motions[i].gear().sign();
+            let ahead = at.point_to_local(start.position()).x * sign;
+            driven = (driven.abs() + ahead).clamp(0.0, length) * sign;
             at = motions[i].at(self.begins[i], driven);
         }
         let first = Segment { length: motions[i].length - driven, ..motions[i] };
-        Some(Path::new(at, std::iter::once(first).chain(motions[i + 1..].iter().copied())))
+        Path::new(at, std::iter::once(first).chain(motions[i + 1..].iter().copied()))
     }
 }
 
@@ -134,8 +165,8 @@ impl Library {
     pub fn rest(&self, problem: &Problem, model: &CostModel, bound: f64) -> Option<(Path, f64)> {
         let passages = self.passages.get_or_init(|| Passages::new(&self.manoeuvres, &self.vehicle));
         let start = problem.goal.relative(problem.start);
-        let near = passages.near(start).into_iter();
-        let near = near.filter_map(|i| self.manoeuvres[i].rest(start, &self.vehicle));
+        let near = passages.near(start, &self.vehicle).into_iter();
+        let near = near.map(|(i, place)| self.manoeuvres[i].rest(place, start));
         let cost = |path: &Path| model.path(&self.vehicle, &path.segments);
         let near = near.map(|path| (cost(&path), path));
         let mut near: Vec<(f64, Path)> = near.filter(|(cost, _)| *cost < bound).collect();
