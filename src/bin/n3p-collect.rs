@@ -1,11 +1,12 @@
 //! `n3p-collect`: solves parking in abstracted environments and stores the samples.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput};
+use n3p::files;
 use n3p::lab::dataset::{self, CollectConfig, CollectOptions, Dataset, Part, TypeReport};
 use n3p::lab::progress;
 use n3p::toml_file::Setting;
@@ -73,8 +74,20 @@ fn run(args: &Args) -> anyhow::Result<ExitCode> {
         // Read back: what is on the disk counts.
         let data = Dataset::read_types(&args.out, &kinds)?;
         cli::print(format!("checksum of settings and rows: {}", data.content_sha256(&kinds)))?;
+        write_card(&args.out)?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes the card of all the types that are complete.
+fn write_card(folder: &Path) -> anyhow::Result<()> {
+    let is_complete = |kind: &ParkingType| dataset::manifest::manifest_path(folder, *kind).exists();
+    let kinds: Vec<ParkingType> = ParkingType::ALL.into_iter().filter(is_complete).collect();
+    let set = Dataset::read_types(folder, &kinds)?;
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    let card = dataset::card::card(&name, &set, &set.content_sha256(&kinds));
+    files::write_whole(&folder.join("card.md"), card.as_bytes())?;
+    Ok(())
 }
 
 fn summary(report: &TypeReport) -> String {

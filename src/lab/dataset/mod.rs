@@ -8,6 +8,7 @@
 //! | `TYPE-0003.parquet` | one shard: some consecutive cells of one parking type |
 //! | `TYPE-0003.json` | its checksum and counts, until the manifest takes them over |
 //! | `TYPE.manifest.json` | checksums and counts of all shards; written last |
+//! | `card.md` | what it is and what is in it, for people; written by `n3p-collect` |
 //!
 //! A type without manifest is incomplete. Poses are rear-axle poses in the spot frame.
 //!
@@ -16,6 +17,7 @@
 //! bookkeeping; [`read`] gives the rows back; [`content_sha256`] names them; [`split`] picks the cells that validate, [`Subset`] a part of
 //! the whole.
 
+pub mod card;
 pub mod collect;
 pub mod config;
 mod identity;

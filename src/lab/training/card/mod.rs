@@ -4,6 +4,7 @@
 //! seed give the same bytes. Programs read the log instead ([`super::log_path`]).
 
 mod fleet;
+mod foresight;
 mod knn;
 mod mlp;
 
@@ -11,16 +12,16 @@ use std::fmt::Write;
 use std::path::Path;
 
 pub(super) use fleet::fleet;
+pub(super) use foresight::foresight;
 pub(super) use knn::knn;
 pub(super) use mlp::mlp;
 
 use super::quality::{Errors, Reach};
 use super::worlds::WorldsConfig;
-use crate::lab::dataset::Metadata;
+use crate::lab::dataset::card::{data, number, percent, spots, vehicle};
 use crate::world::ParkingType;
-use crate::world::cell::Axis;
 
-pub(super) const VERSION: &str = env!("CARGO_PKG_VERSION");
+pub(super) use crate::lab::dataset::card::VERSION;
 
 /// Inputs of every selector.
 const INPUTS: &str = "\
@@ -33,71 +34,6 @@ of travel, +y from the spot toward the lane; headings are counter-clockwise posi
 | x, y, θ | m, m, rad | where the car starts; θ in (−π, π] |
 | lane width, spot width, dead end | m, m, m | the cell: free space around the spot, rounded down to the grid below; the dead end is the way from the spot's centre along +x to the end of the lane |
 ";
-
-/// Provenance of the data and the grid. `rows`: all and solved ones of each type.
-fn data(metadata: &Metadata, sha256: &str, rows: &[(ParkingType, usize, usize)]) -> String {
-    let m = metadata;
-    let mut counts = String::new();
-    for &(kind, all, solved) in rows {
-        let share = percent(solved as f64 / all as f64);
-        let cells = m.grid.cell_count(kind);
-        let _ = writeln!(counts, "| {kind} | {cells} | {all} | {solved} ({share}) |");
-    }
-    let mut axes = String::new();
-    let mut axis = |name: &str, axis: &Axis| {
-        let last = axis.value(axis.len() - 1);
-        let [min, max, step] = [axis.min, last, axis.step].map(number);
-        let _ = writeln!(axes, "| {name} | {min} | {max} | {step} |");
-    };
-    let mut depths = Vec::new();
-    axis("lane width", &m.grid.lane_width);
-    for (is_bay, spots) in [(true, "bays"), (false, "parallel spots")] {
-        let Some((kind, ..)) = rows.iter().find(|r| r.0.is_bay() == is_bay) else { continue };
-        axis(&format!("spot width, {spots}"), m.grid.spot_width(*kind));
-        depths.push(format!("{spots} are {} m deep", number(m.grid.depth(*kind))));
-    }
-    axis("dead end", &m.grid.dead_end);
-    let slants = match rows.iter().any(|r| r.0 == ParkingType::Angled) {
-        true => {
-            let Axis { min, max, step } = m.grid.slant_deg;
-            format!(
-                "Angled bays: at {min}° to {max}° from the direction of travel to the way out by \
-                 {step}°, 90° left out, tail in\nand nose in; their dead end is the way from the \
-                 middle of the spot's mouth.\n"
-            )
-        }
-        false => String::new(),
-    };
-    let (back, depths) = (number(m.grid.back), depths.join(", "));
-    let [behind, turn] = [m.start_behind, m.start_heading_max.to_degrees()].map(number);
-    format!(
-        "\
-## Data
-
-| | |
-|---|---|
-| SHA-256 of settings and rows (`data_sha256`) | `{sha256}` |
-| Seed | {seed} |
-| Starts | {per_cell} in each cell's lane and up to {behind} m behind it, headings within ±{turn}° |
-| Solved by | Hybrid A* with at most {budget} expansions, the cheapest of up to {solutions} solutions |
-
-| type | cells | rows | solved |
-|---|--:|--:|--:|
-{counts}
-The grid of cells:
-
-| metres | from | to | step |
-|---|--:|--:|--:|
-{axes}
-A cell's lane reaches {back} m back from the spot's centre; {depths}. The largest dead end also
-stands for none at all.
-{slants}",
-        seed = m.seed,
-        per_cell = m.samples_per_cell,
-        budget = m.max_expansions,
-        solutions = m.solutions,
-    )
-}
 
 /// What manoeuvres serve.
 fn in_worlds(WorldsConfig { count, seed }: &WorldsConfig) -> String {
@@ -143,37 +79,8 @@ and the lane behind them; scenes leave more room:
     )
 }
 
-fn vehicle(metadata: &Metadata) -> String {
-    let v = &metadata.vehicle;
-    let sizes = [v.length, v.width, v.wheelbase, v.rear_overhang];
-    let [length, width, wheelbase, overhang] = sizes.map(number);
-    let (steer, degrees) = (v.max_steer, v.max_steer.to_degrees());
-    format!(
-        "{length} m long, {width} m wide, wheelbase {wheelbase} m, rear overhang {overhang} m,\n  \
-         steering up to {steer:.4} rad ({degrees:.1}°)"
-    )
-}
-
-fn spots(kind: ParkingType) -> &'static str {
-    match kind {
-        ParkingType::Forward => "forward bays (nose in)",
-        ParkingType::Reverse => "reverse bays (tail in)",
-        ParkingType::Parallel => "parallel spots",
-        ParkingType::Angled => "angled bays (30° to 150°, nose in or tail in)",
-    }
-}
-
 pub(super) fn name(out: &Path) -> String {
     format!("`{}`", out.file_name().unwrap_or_default().to_string_lossy())
-}
-
-pub(super) fn percent(share: f64) -> String {
-    format!("{:.1} %", 100.0 * share)
-}
-
-/// A number without the noise of its last digits.
-fn number(v: f64) -> String {
-    ((v * 1e6).round() / 1e6).to_string()
 }
 
 #[cfg(test)]
@@ -183,7 +90,7 @@ mod tests {
     use super::super::knn::{KnnKindLog, KnnLog, LeaveOneOut};
     use super::super::mlp::TrainingLog;
     use super::*;
-    use crate::lab::dataset::CollectConfig;
+    use crate::lab::dataset::{CollectConfig, Metadata};
 
     const KIND: ParkingType = ParkingType::Reverse;
 

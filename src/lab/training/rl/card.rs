@@ -5,7 +5,8 @@ use std::path::Path;
 
 use super::log::RlLog;
 use crate::environment::courses::{Course, Stratum};
-use crate::lab::training::card::{VERSION, name, percent};
+use crate::lab::dataset::card::percent;
+use crate::lab::training::card::{VERSION, name};
 use crate::world::ParkingType;
 
 /// The card of the policy in `out`.

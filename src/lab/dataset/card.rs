@@ -1,0 +1,180 @@
+//! The card of a data set: what it is, where it comes from, what is in it and what is not, in Markdown.
+//!
+//! It says nothing of the day, the machine or the build, so that the same settings give the same bytes.
+
+use std::fmt::Write;
+
+use super::{Dataset, Metadata, Sample, Status};
+use crate::world::ParkingType;
+use crate::world::cell::Axis;
+
+pub(in crate::lab) const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// The card of a data set with this checksum, in a folder of this name.
+pub fn card(name: &str, set: &Dataset, sha256: &str) -> String {
+    let of = |kind: ParkingType| set.samples.iter().filter(move |s| s.cell.kind() == kind);
+    let kinds: Vec<ParkingType> =
+        ParkingType::ALL.into_iter().filter(|kind| of(*kind).next().is_some()).collect();
+    let rows = |&kind: &ParkingType| {
+        (kind, of(kind).count(), of(kind).filter(|s| s.status == Status::Solved).count())
+    };
+    let rows: Vec<_> = kinds.iter().map(rows).collect();
+    let (mut ends, mut paths) = (String::new(), String::new());
+    for &kind in &kinds {
+        let count = |status| of(kind).filter(|s| s.status == status).count().to_string();
+        let counts = Status::ALL.map(count).join(" | ");
+        let _ = writeln!(ends, "| {kind} | {counts} |");
+        let solved: Vec<&Sample> = of(kind).filter(|s| s.status == Status::Solved).collect();
+        let quantiles = |value: fn(&Sample) -> f64| {
+            let mut values: Vec<f64> = solved.iter().map(|s| value(s)).collect();
+            values.sort_by(f64::total_cmp);
+            let at = |share: f64| values.get((share * (values.len().max(1) - 1) as f64) as usize);
+            [0.05, 0.5, 0.95].map(|share| at(share).map_or("–".to_owned(), |v| format!("{v:.1}")))
+        };
+        let columns = [
+            quantiles(|s| s.start.x),
+            quantiles(|s| s.path_length),
+            quantiles(|s| f64::from(s.direction_changes)),
+            quantiles(|s| f64::from(s.expansions)),
+        ];
+        let columns = columns.map(|of| of.join(" / ")).join(" | ");
+        let _ = writeln!(paths, "| {kind} | {columns} |");
+    }
+    let statuses = Status::ALL.map(|status| format!("`{}`", status.name())).join(" | ");
+    let kinds: Vec<&str> = kinds.iter().map(|kind| spots(*kind)).collect();
+    format!(
+        "\
+# Data card: `{name}`
+
+Reeds-Shepp start poses of solved parking problems in abstracted environments: for {kinds}.
+Written by n3p {VERSION}; the columns are in docs/formats.md.
+
+## What it is for
+
+Preparatory poses and manoeuvres are learnt from it (`n3p-train`). Every row is a start in a cell, two rectangles of free
+space, and how the path from there ends. Failed rows stay, so that coverage can be seen.
+
+## Limits
+
+- For one vehicle: {vehicle}.
+- Taken from this planner's own solutions, not from drivers. Environments are two empty rectangles: nothing
+  stands slanted, nothing protrudes.
+- The rows of a cell share their environment; keep whole cells apart to ask how well something learnt carries over.
+
+{data}
+## How the rows ended
+
+| type | {statuses} |
+|---|--:|--:|--:|--:|--:|--:|
+{ends}
+Of the solved ones, 5 % / median / 95 %:
+
+| type | start x, m | path, m | changes of direction | expansions |
+|---|---|---|---|---|
+{paths}",
+        kinds = kinds.join(", "),
+        vehicle = vehicle(&set.metadata),
+        data = data(&set.metadata, sha256, &rows),
+    )
+}
+
+/// Provenance of the data and the grid. `rows`: all and solved ones of each type.
+pub(in crate::lab) fn data(
+    metadata: &Metadata,
+    sha256: &str,
+    rows: &[(ParkingType, usize, usize)],
+) -> String {
+    let m = metadata;
+    let mut counts = String::new();
+    for &(kind, all, solved) in rows {
+        let share = percent(solved as f64 / all as f64);
+        let cells = m.grid.cell_count(kind);
+        let _ = writeln!(counts, "| {kind} | {cells} | {all} | {solved} ({share}) |");
+    }
+    let mut axes = String::new();
+    let mut axis = |name: &str, axis: &Axis| {
+        let last = axis.value(axis.len() - 1);
+        let [min, max, step] = [axis.min, last, axis.step].map(number);
+        let _ = writeln!(axes, "| {name} | {min} | {max} | {step} |");
+    };
+    let mut depths = Vec::new();
+    axis("lane width", &m.grid.lane_width);
+    for (is_bay, spots) in [(true, "bays"), (false, "parallel spots")] {
+        let Some((kind, ..)) = rows.iter().find(|r| r.0.is_bay() == is_bay) else { continue };
+        axis(&format!("spot width, {spots}"), m.grid.spot_width(*kind));
+        depths.push(format!("{spots} are {} m deep", number(m.grid.depth(*kind))));
+    }
+    axis("dead end", &m.grid.dead_end);
+    let slants = match rows.iter().any(|r| r.0 == ParkingType::Angled) {
+        true => {
+            let Axis { min, max, step } = m.grid.slant_deg;
+            format!(
+                "Angled bays: at {min}° to {max}° from the direction of travel to the way out by \
+                 {step}°, 90° left out, tail in\nand nose in; their dead end is the way from the \
+                 middle of the spot's mouth.\n"
+            )
+        }
+        false => String::new(),
+    };
+    let (back, depths) = (number(m.grid.back), depths.join(", "));
+    let [behind, turn] = [m.start_behind, m.start_heading_max.to_degrees()].map(number);
+    format!(
+        "\
+## Data
+
+| | |
+|---|---|
+| SHA-256 of settings and rows (`data_sha256`) | `{sha256}` |
+| Seed | {seed} |
+| Starts | {per_cell} in each cell's lane and up to {behind} m behind it, headings within ±{turn}° |
+| Solved by | Hybrid A* with at most {budget} expansions, the cheapest of up to {solutions} solutions |
+
+| type | cells | rows | solved |
+|---|--:|--:|--:|
+{counts}
+The grid of cells:
+
+| metres | from | to | step |
+|---|--:|--:|--:|
+{axes}
+A cell's lane reaches {back} m back from the spot's centre; {depths}. The largest dead end also
+stands for none at all.
+{slants}",
+        seed = m.seed,
+        per_cell = m.samples_per_cell,
+        budget = m.max_expansions,
+        solutions = m.solutions,
+    )
+}
+
+/// Its vehicle in words.
+pub(in crate::lab) fn vehicle(metadata: &Metadata) -> String {
+    let v = &metadata.vehicle;
+    let sizes = [v.length, v.width, v.wheelbase, v.rear_overhang];
+    let [length, width, wheelbase, overhang] = sizes.map(number);
+    let (steer, degrees) = (v.max_steer, v.max_steer.to_degrees());
+    format!(
+        "{length} m long, {width} m wide, wheelbase {wheelbase} m, rear overhang {overhang} m,\n  \
+         steering up to {steer:.4} rad ({degrees:.1}°)"
+    )
+}
+
+/// A parking type in words.
+pub(in crate::lab) fn spots(kind: ParkingType) -> &'static str {
+    match kind {
+        ParkingType::Forward => "forward bays (nose in)",
+        ParkingType::Reverse => "reverse bays (tail in)",
+        ParkingType::Parallel => "parallel spots",
+        ParkingType::Angled => "angled bays (30° to 150°, nose in or tail in)",
+    }
+}
+
+/// A share in percent.
+pub(in crate::lab) fn percent(share: f64) -> String {
+    format!("{:.1} %", 100.0 * share)
+}
+
+/// A number without the noise of its last digits.
+pub(in crate::lab) fn number(v: f64) -> String {
+    ((v * 1e6).round() / 1e6).to_string()
+}
