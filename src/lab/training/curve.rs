@@ -13,6 +13,19 @@ pub struct EpochLoss {
     pub validation: f32,
 }
 
+/// A line of the stream of a training ([`super::watch`]).
+#[derive(serde::Serialize)]
+pub(super) struct EpochLine<'a> {
+    /// What is trained.
+    pub name: &'a str,
+    /// The epoch, from 1, and how many there may be.
+    pub epoch: usize,
+    pub epochs: usize,
+    pub learning_rate: f64,
+    #[serde(flatten)]
+    pub loss: EpochLoss,
+}
+
 /// An SVG with training and validation loss over the epochs, loss logarithmic.
 pub fn svg(title: &str, losses: &[EpochLoss]) -> Result<String, TrainingError> {
     let mut text = String::new();

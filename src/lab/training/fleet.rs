@@ -12,6 +12,7 @@ use super::mlp::{LEAST_SAMPLES, split};
 use super::quality::{Errors, Reach, errors, reach};
 use super::regression::{Rows, Trainable, fit, predictions};
 use super::targets::{self, Example};
+use super::watch::Watch;
 use super::worlds::WorldsConfig;
 use super::{MlpConfig, TrainingError, card, solved, write_beside};
 use crate::geometry::Pose;
@@ -85,9 +86,10 @@ pub fn train(
         let sources = sources(sets, of_sets);
         worlds.learn(Stance::new(*kind, 0.0), condense(&sources), &sources)
     });
+    let mut watch = Watch::begin(out, false)?;
     let (mut scaling, mut networks, mut logs) = (Vec::new(), Vec::new(), Vec::new());
     for ((kind, of_sets), manoeuvres) in solved.iter().zip(&condensed) {
-        let learnt = learn(sets, *kind, of_sets, config, manoeuvres.len())?;
+        let learnt = learn(sets, *kind, of_sets, config, manoeuvres.len(), &mut watch)?;
         scaling.push(learnt.scaling);
         networks.push(learnt.weights);
         logs.push(learnt.log);
@@ -156,6 +158,7 @@ fn learn(
     solved: &[Vec<&Sample>],
     config: &MlpConfig,
     manoeuvres: usize,
+    watch: &mut Watch,
 ) -> Result<Learnt, TrainingError> {
     let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
     let parts = sets.iter().zip(solved).map(|(set, solved)| {
@@ -171,7 +174,7 @@ fn learn(
         .map(|(inputs, outputs)| Rows::new(&inputs, &outputs, &scaling.input, &scaling.output));
     let model = Trainable::new(&UNIT_LAYERS, config.seed)?;
     let mut best = None;
-    let losses = fit(&model, &train, &validation, config, kind.name(), |losses| {
+    let losses = fit(&model, &train, &validation, config, (kind.name(), watch), |losses| {
         let predicted = predictions(&model, &validation, &scaling.output)?;
         let (errors, reach) = judge(&parts, &predicted);
         best = Some((model.weights()?, losses.len(), errors, reach));

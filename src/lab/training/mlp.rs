@@ -18,6 +18,7 @@ use super::curve::{self, EpochLoss};
 use super::quality::{Errors, Reach, errors, reach};
 use super::regression::{Rows, Trainable, fit, predictions};
 use super::targets::{self, Example};
+use super::watch::Watch;
 use super::{MlpConfig, TrainingError, Validation, card, solved, write_beside};
 use crate::lab::dataset::{Metadata, Sample, content_sha256, validation_cells};
 use crate::selectors::artefact;
@@ -118,7 +119,9 @@ pub fn train(
         reach: reach(metadata, &validation, &first),
     };
     let rows = samples.iter().filter(|s| s.cell.kind() == kind).count();
-    let losses = fit(&model, &train, &validation_rows, config, kind.name(), |losses| {
+    let mut watch = Watch::begin(out, false)?;
+    let named = (kind.name(), &mut watch);
+    let losses = fit(&model, &train, &validation_rows, config, named, |losses| {
         log.losses = losses.to_vec();
         log.best_epoch = losses.len();
         let predicted = predictions(&model, &validation_rows, &header.output)?;

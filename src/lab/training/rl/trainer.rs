@@ -21,6 +21,7 @@ use crate::lab::rl::network::ACTION;
 use crate::lab::rl::policy_file::{self, PolicyHeader};
 use crate::lab::rl::replay::{Replay, Transition};
 use crate::lab::rl::sac::{Losses, Sac};
+use crate::lab::training::watch::Watch;
 use crate::lab::training::{TrainingError, write_beside};
 use crate::n3p::Choice;
 use crate::rng::{Stream, rng};
@@ -54,6 +55,7 @@ pub fn train(
         (Begin::Resume, true) => Trainer::resumed(course, config, &path, device)?,
         (_, false) => Trainer::new(course, config, device),
     };
+    let mut watch = Watch::begin(out, trainer.episodes > 0)?;
     let bar = progress::bar(config.episodes as u64, course.name());
     while trainer.episodes < config.episodes {
         bar.set_position(trainer.episodes as u64);
@@ -62,6 +64,7 @@ pub fn train(
         if trainer.is_due() {
             trainer.report(out)?;
             let point = trainer.log.points.last().expect("a report adds a point");
+            watch.tell(point)?;
             let problems = trainer.validation_problems() as f64;
             let validated = f64::from(point.validated().total()) / problems;
             let line = format!(
@@ -81,6 +84,7 @@ pub fn train(
     bar.finish_and_clear();
     if trainer.log.points.last().is_none_or(|p| p.episodes < trainer.episodes) {
         trainer.report(out)?;
+        watch.tell(trainer.log.points.last().expect("a report adds a point"))?;
     }
     write_beside(out, &trainer.log, card::card(out, &trainer.log))?;
     let picture = curve::svg(&trainer.log)?;
