@@ -168,7 +168,7 @@ fn settings_decide_what_is_tried_before_a_search() {
     };
     let all = RankedConfig::default();
     let without = RankedConfig { library: false, ..all };
-    let one = RankedConfig { library: false, candidates: 1, abstractions: 1 };
+    let one = RankedConfig { library: false, foresight: false, candidates: 1, abstractions: 1 };
     let (all_of_it, some, one) = (plans(all), plans(without), plans(one));
     assert_eq!((some.0, one.0), (0, 0), "nothing is looked up");
     assert!(all_of_it.0 > 0 && all_of_it.1 < some.1, "{all_of_it:?} {some:?}");

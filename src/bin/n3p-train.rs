@@ -9,6 +9,7 @@ use clap::{Args, Parser, Subcommand};
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::environment::courses::{Course, Stratum};
 use n3p::lab::dataset::Dataset;
+use n3p::lab::training::foresight::{ForesightConfig, LibraryLog};
 use n3p::lab::training::quality::{Errors, Reach};
 use n3p::lab::training::rl::{Begin, RlConfig};
 use n3p::lab::training::worlds::WorldsConfig;
@@ -41,6 +42,14 @@ enum Command {
     ///
     /// A model card, a training log and the loss curves are written beside the model.
     Fleet(FleetArgs),
+    /// Trains the network that foresees what known manoeuvres are worth in a scene
+    ///
+    /// A model card, a training log and the loss curve are written beside the model.
+    Foresight(ForesightArgs),
+    /// Writes the networks of a model as ONNX files, for other runtimes
+    ///
+    /// Raw features in, raw outputs out; the model's card says which.
+    Onnx(OnnxArgs),
     /// Trains a driving policy by soft actor-critic
     ///
     /// May be interrupted at any moment: the best policy so far is in its file, and --resume goes
@@ -119,6 +128,37 @@ struct FleetArgs {
 }
 
 #[derive(Args)]
+struct ForesightArgs {
+    /// A model whose manoeuvres it learns with; may be given several times. Bare names are looked for in
+    /// the working folder, then in models/
+    #[arg(long, value_name = "FILE", default_values = ["knn.bin", "knn-tpcap.bin", "fleet.safetensors"])]
+    model: Vec<PathBuf>,
+    /// Model file
+    #[arg(long, value_name = "FILE", default_value = "models/foresight.safetensors")]
+    out: PathBuf,
+    /// Settings of the training, a TOML file; the defaults when omitted
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// A setting instead of the file's, such as epochs=5; may be given several times
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<Setting>,
+    /// Seed of worlds, weights and shuffling; overrides the settings
+    #[arg(long, value_name = "S")]
+    seed: Option<u64>,
+}
+
+#[derive(Args)]
+struct OnnxArgs {
+    /// The model: mlp-TYPE.safetensors, fleet.safetensors or foresight.safetensors. A bare name is looked for
+    /// in the working folder, then in models/
+    #[arg(long, value_name = "FILE")]
+    model: PathBuf,
+    /// Folder of the files, MODEL.onnx or MODEL-NETWORK.onnx
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    out: PathBuf,
+}
+
+#[derive(Args)]
 struct RlArgs {
     /// Where it learns: in abstracted environments (simple) or in generated scenes (eval)
     #[arg(long = "env", value_name = "ENV")]
@@ -151,6 +191,8 @@ fn main() -> ExitCode {
         Command::Mlp(args) => mlp(args),
         Command::Knn(args) => knn(args),
         Command::Fleet(args) => fleet(args),
+        Command::Foresight(args) => foresight(args),
+        Command::Onnx(args) => onnx(args),
         Command::Rl(args) => rl(args),
     })
 }
@@ -279,6 +321,47 @@ fn fleet(args: &FleetArgs) -> anyhow::Result<ExitCode> {
         log.fleet.len(),
         log.bytes
     ))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn foresight(args: &ForesightArgs) -> anyhow::Result<ExitCode> {
+    let mut config = ForesightConfig::read(args.config.as_deref(), &args.set).or_bad_input()?;
+    config.seed = args.seed.unwrap_or(config.seed);
+    config.validate().or_bad_input()?;
+    artefact::check_writable(&args.out).or_bad_input()?;
+    let models = training::foresight::load(&args.model).or_bad_input()?;
+    let log = training::foresight::train(models, &config, &args.out).map_err(|e| {
+        if e.is_bad_input() { BadInput(e.to_string()).into() } else { anyhow::Error::from(e) }
+    })?;
+    for LibraryLog { model, vehicle, kind, validation: v, .. } in &log.libraries {
+        cli::print(format!(
+            "{model}, {:.2} m, {kind}: in {} scenes the first 3 hold the best in {:.0} % (by estimates {:.0} %), \
+             the first 12 in {:.0} % ({:.0} %); cost foreseen to {:.1} % (median), {:.0} % (P95)",
+            vehicle.length,
+            v.scenes,
+            100.0 * v.in_first,
+            100.0 * v.in_first_by_estimate,
+            100.0 * v.in_order,
+            100.0 * v.in_order_by_estimate,
+            100.0 * v.cost_median,
+            100.0 * v.cost_p95,
+        ))?;
+    }
+    cli::print(format!(
+        "{}: best of {} epochs is {}; {} bytes",
+        args.out.display(),
+        log.losses.len(),
+        log.best_epoch,
+        log.bytes
+    ))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn onnx(args: &OnnxArgs) -> anyhow::Result<ExitCode> {
+    let files = training::onnx::export(&artefact::find_model(&args.model), &args.out);
+    for file in files.or_bad_input()? {
+        cli::print(file.display().to_string())?;
+    }
     Ok(ExitCode::SUCCESS)
 }
 

@@ -8,8 +8,10 @@ use serde::Serialize;
 use super::models::named;
 use super::{TrainedPolicy, more};
 use crate::selectors::artefact::{ArtefactError, Fault};
+use crate::selectors::foresight::Foresight;
 use crate::selectors::model::Model;
 use crate::vehicle::Vehicle;
+use crate::world::ParkingType;
 
 /// A model that could be planned with.
 #[derive(Clone, Debug, Serialize)]
@@ -18,7 +20,7 @@ pub struct Listing {
     pub path: PathBuf,
     /// Whether it is compiled in.
     pub compiled_in: bool,
-    /// What it is: `knn`, `mlp`, `fleet` or `rl-COURSE`.
+    /// What it is: `knn`, `mlp`, `fleet`, `foresight` or `rl-COURSE`.
     pub what: String,
     /// The parking types it knows.
     pub types: Vec<&'static str>,
@@ -48,6 +50,11 @@ impl Listing {
                 let TrainedPolicy { course, vehicle, .. } = more::read_policy(&path)?;
                 let (what, vehicle) = (format!("rl-{course}"), Some(vehicle));
                 Ok(Self { what, types: Vec::new(), vehicle, path, compiled_in })
+            }
+            Err(ArtefactError { fault: Fault::Foresight, .. }) => {
+                Foresight::load(&path)?;
+                let types = ParkingType::SQUARE.iter().map(|kind| kind.name()).collect();
+                Ok(Self { what: "foresight".to_owned(), types, vehicle: None, path, compiled_in })
             }
             Err(error) => Err(error),
         }

@@ -26,10 +26,13 @@ use crate::planners::{
 use crate::world::Stance;
 use crate::world::abstraction::{Abstraction, abstractions};
 
+use crate::selectors::foresight::Foresight;
 use crate::selectors::{Features, PoseSelector};
 
-mod known;
+mod foreseen;
+pub(crate) mod known;
 
+use foreseen::{FAR_FROM_FORESEEN, Ranking};
 use known::{DEAR_BY_UNUSUAL, Known, Prepared, Standard, most_changes};
 
 /// Expansions that the paper's two legs may spend, so that a pose just beside the feasible
@@ -50,6 +53,8 @@ const UNUSUAL_SEARCH: usize = 3_000;
 pub struct RankedConfig {
     /// Whether the selector's known manoeuvres come first.
     pub library: bool,
+    /// Whether a network says which of them to try first, and when a plan will do.
+    pub foresight: bool,
     /// Ranked poses asked for in each abstraction, 1 to 1000.
     pub candidates: usize,
     /// Abstractions tried, 1 to 1000.
@@ -58,7 +63,7 @@ pub struct RankedConfig {
 
 impl Default for RankedConfig {
     fn default() -> Self {
-        Self { library: true, candidates: 12, abstractions: 3 }
+        Self { library: true, foresight: true, candidates: 12, abstractions: 3 }
     }
 }
 
@@ -93,6 +98,8 @@ pub struct GuidedPlanner {
     libraries: Vec<Prepared>,
     library_search: LibrarySearch,
     verdicts: Verdicts,
+    foresight: Option<Arc<Foresight>>,
+    ranking: Ranking,
 }
 
 impl GuidedPlanner {
@@ -126,7 +133,14 @@ impl GuidedPlanner {
             libraries: Vec::new(),
             library_search: LibrarySearch::default(),
             verdicts: Verdicts::default(),
+            foresight: None,
+            ranking: Ranking::default(),
         }
+    }
+
+    /// The same with a network that foresees what known manoeuvres are worth.
+    pub fn with_foresight(self, foresight: Option<Arc<Foresight>>) -> Self {
+        Self { foresight, ..self }
     }
 
     /// Asks for up to `k` poses for an abstraction of `problem`, in the planning frame.
@@ -225,7 +239,8 @@ impl GuidedPlanner {
         {
             let guidance = guidance(untried.entries().get(leg.entry), Route::Direct);
             let plain = self.hars.goal_set(problem);
-            let known = Known { path: leg.path, cost: leg.cost, guidance, least: 0.0 };
+            let known =
+                Known { path: leg.path, cost: leg.cost, guidance, least: 0.0, foreseen: None };
             return Ok(self.settle(problem, &plain, known, effort, left));
         }
         // One search: it begins at the goal and at every preparatory pose.
@@ -265,15 +280,17 @@ impl GuidedPlanner {
         if is_usual && !self.hars.passes_near(problem, &known.path) {
             return (known.path, known.guidance);
         }
-        let Known { path, mut guidance, least, .. } = known;
+        let Known { path, mut guidance, least, foreseen, .. } = known;
         let before = *left;
         let mut refined = self.hars.refine(problem, goal, path.clone(), Effort::Usual, None, left);
         let cost = self.path_cost(problem, &refined);
-        let is_dear = cost > DEAR_BY_UNUSUAL * least
+        let limit = foreseen.map_or(DEAR_BY_UNUSUAL * least, |f| FAR_FROM_FORESEEN * f);
+        let is_dear = cost > limit
             && cost > standard.enough(&mut self.hars)
-            && standard.is_unusual();
-        let doubtful =
-            refined.direction_changes() > most_changes(problem.kind) && cost > DOUBTFUL * least;
+            && (foreseen.is_some() || standard.is_unusual());
+        let doubtful = foreseen.is_none()
+            && refined.direction_changes() > most_changes(problem.kind)
+            && cost > DOUBTFUL * least;
         if is_dear {
             refined = self.or_searched(problem, goal, refined, UNUSUAL_SEARCH, false, left);
         } else if doubtful {

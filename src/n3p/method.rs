@@ -203,27 +203,40 @@ impl Method {
                 driver.planner(self.name(), settings).map_err(MethodError::Policy)
             }
             Make::Guided(..) | Make::Trained(_) => {
-                let planner = |own: &VehicleModels| Ok((*own.vehicle(), self.with(own, settings)?));
+                let planner =
+                    |own: &VehicleModels| Ok((*own.vehicle(), self.with(own, models, settings)?));
                 let planners = models.for_method(self).map(planner).collect::<Result<_, _>>()?;
-                let any = models.fleet(self).map(|selector| self.guided(selector, settings));
+                let any =
+                    models.fleet(self).map(|selector| self.guided(selector, models, settings));
                 ByVehicle::new(planners, any).ok_or_else(|| self.no_model())
             }
         }
     }
 
     /// The planner of a learnt method with the models of one vehicle, which hold what it needs.
-    fn with(self, models: &VehicleModels, settings: &MethodSettings) -> Result<Boxed, MethodError> {
-        if let Some(driver) = self.course().and_then(|course| models.driver(course)) {
+    fn with(
+        self,
+        own: &VehicleModels,
+        models: &Models,
+        settings: &MethodSettings,
+    ) -> Result<Boxed, MethodError> {
+        if let Some(driver) = self.course().and_then(|course| own.driver(course)) {
             return driver.planner(self.name(), settings).map_err(MethodError::Policy);
         }
-        let selector = models.selector(self).expect("models that serve the method");
-        Ok(self.guided(selector, settings))
+        let selector = own.selector(self).expect("models that serve the method");
+        Ok(self.guided(selector, models, settings))
     }
 
     /// The planner of a guided method with its selector.
-    fn guided(self, selector: Arc<dyn PoseSelector>, settings: &MethodSettings) -> Boxed {
+    fn guided(
+        self,
+        selector: Arc<dyn PoseSelector>,
+        models: &Models,
+        settings: &MethodSettings,
+    ) -> Boxed {
         let Make::Guided(_, make) = self.0.make else { unreachable!("only these have selectors") };
-        Box::new(make(self.name(), selector, settings))
+        let foresight = models.foresight().filter(|_| settings.n3p.foresight);
+        Box::new(make(self.name(), selector, settings).with_foresight(foresight.cloned()))
     }
 
     /// That there is no model, and how to get one.

@@ -15,4 +15,4 @@ pub use catalogue::{Listing, catalogue};
 pub use driver::{Choice, Driver, RolloutConfig, TrainedPolicy};
 pub use guided::GuidedPlanner;
 pub use method::{Method, MethodError, MethodSettings};
-pub use models::{Models, ModelsError};
+pub use models::{FORESIGHT, Models, ModelsError};

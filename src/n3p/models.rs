@@ -9,11 +9,15 @@ use super::method::{Learnt, Method};
 use super::{Driver, TrainedPolicy, more};
 use crate::selectors::artefact::{self, ArtefactError, Fault, find_model};
 use crate::selectors::by_kind::ByKind;
+use crate::selectors::foresight::Foresight;
 use crate::selectors::mlp::MlpSelector;
 use crate::selectors::model::Model;
 use crate::selectors::{PoseSelector, shipped};
 use crate::vehicle::Vehicle;
 use crate::world::ParkingType;
+
+/// The usual name of foresight.
+pub const FORESIGHT: &str = "foresight.safetensors";
 
 /// Trained models of any number of vehicles, and a policy from outside.
 #[derive(Clone, Default)]
@@ -22,6 +26,8 @@ pub struct Models {
     vehicles: Vec<VehicleModels>,
     /// For vehicles that none of them serves.
     fleet: Option<Arc<dyn PoseSelector>>,
+    /// What manoeuvres are worth in a scene.
+    foresight: Option<Arc<Foresight>>,
     outside: Option<Arc<dyn Driver>>,
 }
 
@@ -55,6 +61,9 @@ pub enum ModelsError {
     /// Two models for any vehicle were given.
     #[error("--model {0}: a model for any vehicle was given before; give one")]
     TwoFleets(PathBuf),
+    /// Two files of foresight were given.
+    #[error("--model {0}: foresight was given before; give one")]
+    TwoForesights(PathBuf),
     /// Two policies of one course were given.
     #[error("--model {path}: a policy of rl-{course} was given before; give one")]
     TwoPolicies {
@@ -88,17 +97,33 @@ pub enum ModelsError {
 
 impl Models {
     /// Loads every file of `names`; bare names are looked for in the working folder,
-    /// then in `models/`. Networks of several parking types join into one selector.
+    /// then in `models/`. Networks of several parking types join into one selector. Where no foresight is
+    /// given, the usual one serves: `foresight.safetensors`.
     pub fn load<P: AsRef<Path>>(names: &[P]) -> Result<Self, ModelsError> {
         let mut models = Self::default();
         for name in names {
             let path = find_model(name);
             match Model::load(&path) {
                 Err(ArtefactError { fault: Fault::Policy, .. }) => models.add_policy(path)?,
+                Err(ArtefactError { fault: Fault::Foresight, .. }) => {
+                    models.add_foresight(&path)?
+                }
                 model => models.add_selector(model?)?,
             }
         }
+        let usual = find_model(FORESIGHT);
+        if models.foresight.is_none() && artefact::exists(&usual) {
+            models.add_foresight(&usual)?;
+        }
         Ok(models)
+    }
+
+    fn add_foresight(&mut self, path: &Path) -> Result<(), ModelsError> {
+        if self.foresight.is_some() {
+            return Err(ModelsError::TwoForesights(path.to_owned()));
+        }
+        self.foresight = Some(Arc::new(Foresight::load(path)?));
+        Ok(())
     }
 
     fn add_selector(&mut self, model: Model) -> Result<(), ModelsError> {
@@ -213,6 +238,9 @@ impl Models {
     pub fn compiled_in(vehicle: &Vehicle) -> Result<Self, ModelsError> {
         let mut models = Self::default();
         let is_knn = |name: &str| name.starts_with("knn") && name.ends_with(".bin");
+        if shipped::find(Path::new(FORESIGHT)).is_some() {
+            models.add_foresight(Path::new(FORESIGHT))?;
+        }
         let of = |wanted: fn(&str) -> bool| shipped::FILES.iter().filter(move |(n, _)| wanted(n));
         for (name, bytes) in of(is_knn) {
             models.add_selector(Model::from_bytes(Path::new(name), Cow::Borrowed(bytes))?)?;
@@ -223,6 +251,11 @@ impl Models {
             }
         }
         Ok(models)
+    }
+
+    /// What manoeuvres are worth in a scene.
+    pub fn foresight(&self) -> Option<&Arc<Foresight>> {
+        self.foresight.as_ref()
     }
 
     /// The models that `method` plans with, vehicle by vehicle.

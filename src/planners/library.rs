@@ -94,7 +94,7 @@ impl Library {
         let length = |(_, sweep): &(BodyFrame, Sweep)| sweep.segment().length.abs();
         motions.sort_by(|a, b| length(b).total_cmp(&length(a)));
         let entry = Entry::new(pose, segments, true, &self.vehicle, model);
-        self.begins.push(entry.pose, entry.cost());
+        self.begins.push(entry.pose, entry.cost(), entry.departure().gear);
         self.manoeuvres.push(Manoeuvre { entry, begins, motions });
         self.passages.take();
     }
@@ -102,6 +102,11 @@ impl Library {
     /// Whether it was prepared for the vehicle and the footprint of `problem`.
     pub fn fits(&self, problem: &Problem) -> bool {
         self.vehicle == problem.vehicle && self.footprint == *problem.collision.footprint()
+    }
+
+    /// The manoeuvres, each with its cost when begun in its gear with its steering.
+    pub fn manoeuvres(&self) -> impl Iterator<Item = (&[Segment], f64)> {
+        self.manoeuvres.iter().map(|m| (m.entry.rest.as_slice(), m.entry.cost()))
     }
 
     /// Number of manoeuvres.
@@ -170,6 +175,8 @@ pub struct LibrarySearch {
     queue: BinaryHeap<Reverse<Candidate>>,
     /// The candidates that are free, in the order they were checked.
     free: Vec<Candidate>,
+    /// What every manoeuvre is estimated to cost.
+    estimates: Vec<f32>,
     approaches: Approaches,
     analytic: AnalyticExpansion,
 }
@@ -242,8 +249,10 @@ impl LibrarySearch {
         let mut begins = self.approaches.view(&library.begins, seen, &problem.vehicle, model);
         let mut queue = std::mem::take(&mut self.queue).into_vec();
         queue.clear();
+        self.estimates.clear();
         for index in 0..library.len() {
             let estimate = begins.cost(index);
+            self.estimates.push(estimate);
             if f64::from(estimate) < bound {
                 queue.push(Reverse(Candidate::new(estimate, index)));
             }
@@ -274,6 +283,50 @@ impl LibrarySearch {
 }
 
 impl LookUp<'_> {
+    /// What every manoeuvre is estimated to cost, in their order.
+    pub fn estimates(&self) -> &[f32] {
+        &self.search.estimates
+    }
+
+    /// The cheapest plan by one of the manoeuvres `order`ed by promise, all but those estimated to cost
+    /// more than what is found before, if it costs less than `bound`; the first that costs little `enough`.
+    pub fn promising(&mut self, order: &[u32], mut bound: f64, enough: f64) -> Option<LibraryPlan> {
+        let mut best = None;
+        for &index in order {
+            let candidate = Candidate::new(self.search.estimates[index as usize], index as usize);
+            if candidate.estimate() < bound
+                && self.verdicts.is_free(self.library, index as usize, self.problem, self.end)
+                && let Some(plan) = self.join(candidate, bound)
+            {
+                bound = plan.cost;
+                best = Some(plan);
+                if bound <= enough {
+                    break;
+                }
+            }
+        }
+        best
+    }
+
+    /// What plans by the manoeuvres cost that are free and joined by a free curve, and no more than so many
+    /// `times` the cheapest.
+    pub fn costs_within(&mut self, times: f64) -> Vec<(usize, f64)> {
+        let (mut costs, mut bound) = (Vec::new(), f64::INFINITY);
+        while let Some(Reverse(candidate)) = self.search.queue.pop() {
+            if candidate.estimate() >= bound {
+                break;
+            }
+            if self.verdicts.is_free(self.library, candidate.index(), self.problem, self.end)
+                && let Some(plan) = self.join(candidate, bound)
+            {
+                bound = bound.min(times * plan.cost);
+                costs.push((plan.manoeuvre, plan.cost));
+            }
+        }
+        costs.retain(|(_, cost)| *cost < bound);
+        costs
+    }
+
     /// The least estimate of the first `count` manoeuvres and of the others, of those that were not
     /// looked at yet, free or not.
     pub fn least_estimates(&self, count: usize) -> (f64, f64) {
@@ -370,6 +423,7 @@ impl LookUp<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::signed_angle;
     use crate::planners::{Budget, HybridAStar, HybridAStarConfig, PlanResult, Planner};
     use crate::world::generate::{GeneratorConfig, generate};
     use crate::world::{Level, ParkingType};
@@ -425,6 +479,11 @@ mod tests {
             let library = library(kind, *problem.collision.footprint());
             let vehicle = &problem.vehicle;
             let passages = Passages::new(&library.manoeuvres, vehicle);
+            let is_beside = |at: Pose, pose: Pose| {
+                let turn = signed_angle(at.heading, pose.heading).abs();
+                // But for the rounding of what is stored.
+                at.distance(pose) + turn * vehicle.turning_radius() < rest::BESIDE - 1e-4
+            };
             let mut found = 0;
             for i in 0..300 {
                 // Beside some pose of some manoeuvre.
@@ -432,10 +491,11 @@ mod tests {
                 let (.., at) = poses.step_by(3).nth(i % 5).unwrap();
                 let [x, y, turn] = [7, 11, 13].map(|k| (i * k % 101) as f64 / 50.0 - 1.0);
                 let pose = at.compose(Pose::new(0.3 * x, 0.3 * y, 0.1 * turn));
-                let near = passages.near(pose);
+                let near = passages.near(pose, vehicle);
                 for (m, manoeuvre) in library.manoeuvres.iter().enumerate() {
-                    let is_within = manoeuvre.rest(pose, vehicle).is_some();
-                    assert!(!is_within || near.contains(&m), "{kind} {m} {pose:?}");
+                    let is_within =
+                        manoeuvre.poses(vehicle.scale()).any(|(.., at)| is_beside(at, pose));
+                    assert!(!is_within || near.iter().any(|(i, _)| *i == m), "{kind} {m} {pose:?}");
                     found += usize::from(is_within);
                 }
             }

@@ -56,6 +56,12 @@ pub enum Fault {
         "it holds a driving policy, and this program was built without them; build it with --features lab"
     )]
     NoPolicies,
+    /// Foresight, where a selector of preparatory poses is wanted.
+    #[error("it holds foresight, no selector; give it with --model beside a selector")]
+    Foresight,
+    /// A policy, where a network of dense layers is wanted.
+    #[error("it holds no network that is written as ONNX; give an mlp, fleet or foresight model")]
+    NoNetwork,
     /// A selector of preparatory poses, where a policy is wanted.
     #[error("it holds a selector of preparatory poses, no policy; give it with --model")]
     Selector,

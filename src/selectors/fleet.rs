@@ -149,7 +149,7 @@ impl FleetSelector {
             });
             let each = counts.iter().map(|&c| rest.by_ref().take(c as usize).collect());
             let weights = tensor_file::layers(&tensors, &format!("{kind}."), &UNIT_LAYERS)?;
-            let network = Network::new(UNIT_COUNT, &weights);
+            let network = Network::new(&UNIT_LAYERS, &weights);
             kinds.push(OfKind { manoeuvres: each.collect(), network });
         }
         Ok(Self { path: path.to_owned(), header, kinds })

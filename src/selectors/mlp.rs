@@ -85,7 +85,7 @@ impl MlpSelector {
     /// Checks the content of the file at `path`.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, ArtefactError> {
         let (header, weights) = decode(bytes).map_err(|fault| fault.of(path))?;
-        let network = Network::new(Features::COUNT, &weights);
+        let network = Network::new(&LAYERS, &weights);
         Ok(Self { networks: vec![Trained { path: path.to_owned(), header, network }] })
     }
 
@@ -141,7 +141,7 @@ impl MlpSelector {
     pub fn predict(&self, features: &Features) -> Option<Pose> {
         let trained = self.networks.iter().find(|n| n.header.kind == features.cell.kind())?;
         let input = trained.header.input.normalise(features.values());
-        let output = trained.network.forward(&input);
+        let output: [f32; OUTPUTS] = trained.network.forward(&input);
         Some(network::pose_from_outputs(trained.header.output.restore(output)))
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! A [`PoseSelector`] ranks preparatory poses for [`Features`]; [`knn`] and [`mlp`] are
 //! the two of the paper, [`fleet`] is one for any vehicle; [`by_kind`] joins two of
-//! different parking types. [`artefact`] reads and checks their files,
+//! different parking types. [`foresight`] says what a library's manoeuvres are worth in a scene. [`artefact`] reads and checks their files,
 //! [`model`] tells them apart, [`shipped`] has those compiled in. Read next: [`knn_file`] and
 //! [`network`] for what the files hold, [`mod@crate::n3p`] for the planner that uses a selector.
 
@@ -10,6 +10,7 @@ pub mod artefact;
 pub mod by_kind;
 mod features;
 pub mod fleet;
+pub mod foresight;
 pub mod knn;
 pub mod knn_file;
 pub mod mlp;

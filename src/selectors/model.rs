@@ -43,6 +43,7 @@ impl Model {
         }
         match Content::of_file(&bytes) {
             Content::Fleet => Ok(Model::Fleet(Box::new(FleetSelector::from_bytes(path, &bytes)?))),
+            Content::Foresight => Err(Fault::Foresight.of(path)),
             Content::Mlp | Content::Policy => {
                 Ok(Model::Mlp(MlpSelector::from_bytes(path, &bytes)?))
             }

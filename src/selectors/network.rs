@@ -1,5 +1,5 @@
-//! The paper's network, 6 → 256 → 256 → 256 → 128 → 4 with ReLU, evaluated without a
-//! framework; the network for any vehicle has more inputs.
+//! Networks with ReLU evaluated without a framework: the paper's, 6 → 256 → 256 → 256 → 128 → 4, and
+//! others of other widths.
 //!
 //! One sample at a time, plain loops over single precision. A layer's outputs are
 //! computed in blocks whose sums stay in registers while the block's weights are read once,
@@ -45,7 +45,7 @@ pub fn pose_from_outputs([x, y, cos, sin]: [f32; OUTPUTS]) -> Pose {
     Pose::new(x, y, sin.atan2(cos))
 }
 
-/// The network, laid out for evaluation.
+/// A network, laid out for evaluation.
 #[derive(Clone, Debug)]
 pub struct Network {
     layers: Vec<Dense>,
@@ -54,6 +54,7 @@ pub struct Network {
 #[derive(Clone, Debug)]
 struct Dense {
     inputs: usize,
+    outputs: usize,
     /// One per block of outputs; padded with zeros.
     bias: Vec<[f32; BLOCK]>,
     /// Block after block; in a block one row per input.
@@ -72,13 +73,14 @@ impl Dense {
                 weight[block * inputs + i][lane] = weights.weight[o * inputs + i];
             }
         }
-        Self { inputs, bias, weight }
+        Self { inputs, outputs, bias, weight }
     }
 
+    /// Writes the first outputs, as many as there is room for.
     #[inline(always)]
-    fn forward(&self, active: &[(usize, f32)], out: &mut [[f32; BLOCK]; WIDEST / BLOCK]) {
+    fn forward(&self, active: &[(usize, f32)], out: &mut [f32]) {
         let blocks = self.bias.iter().zip(self.weight.chunks_exact(self.inputs));
-        for ((bias, rows), out) in blocks.zip(out) {
+        for ((bias, rows), out) in blocks.zip(out.chunks_mut(BLOCK)) {
             let mut sums = *bias;
             for &(i, v) in active {
                 let row = &rows[i];
@@ -86,19 +88,20 @@ impl Dense {
                     *sum += v * w;
                 }
             }
-            *out = sums;
+            out.copy_from_slice(&sums[..out.len()]);
         }
     }
 }
 
 impl Network {
-    /// Lays out the weights of a network with so many inputs.
+    /// Lays out the weights of layers of these widths, that of the input first; only the last may be
+    /// wider than 256.
     ///
-    /// Panics when their sizes are not those of its [`layers`].
-    pub fn new(inputs: usize, weights: &[LayerWeights]) -> Self {
-        let sizes = layers(inputs);
-        assert_eq!(weights.len(), sizes.len() - 1, "one set of weights per layer");
-        let layers = weights.iter().zip(sizes.windows(2)).map(|(weights, size)| {
+    /// Panics when the sizes of the weights are others.
+    pub fn new(widths: &[usize], weights: &[LayerWeights]) -> Self {
+        assert_eq!(weights.len(), widths.len() - 1, "one set of weights per layer");
+        assert!(widths[..widths.len() - 1].iter().all(|w| *w <= WIDEST), "{widths:?}");
+        let layers = weights.iter().zip(widths.windows(2)).map(|(weights, size)| {
             assert_eq!(weights.weight.len(), size[0] * size[1], "weights of {size:?}");
             assert_eq!(weights.bias.len(), size[1], "biases of {size:?}");
             Dense::new(size[0], size[1], weights)
@@ -107,44 +110,51 @@ impl Network {
     }
 
     /// Normalised features, as many as there are inputs, → normalised outputs.
-    pub fn forward(&self, input: &[f32]) -> [f32; OUTPUTS] {
+    pub fn forward<const N: usize>(&self, input: &[f32]) -> [f32; N] {
+        let mut out = [0.0; N];
+        self.forward_into(input, &mut out);
+        out
+    }
+
+    /// [`Network::forward`] into `out`, which has room for every output.
+    pub fn forward_into(&self, input: &[f32], out: &mut [f32]) {
         assert_eq!(input.len(), self.layers[0].inputs, "one value for each input");
+        assert_eq!(Some(out.len()), self.layers.last().map(|l| l.outputs), "room for the outputs");
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
             // SAFETY: the processor has AVX2.
-            return unsafe { self.forward_avx2(input) };
+            return unsafe { self.forward_avx2(input, out) };
         }
-        self.forward_plain(input)
+        self.forward_plain(input, out);
     }
 
     /// The same loops compiled for eight numbers per register; FMA stays off, for its
     /// rounding would differ.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn forward_avx2(&self, input: &[f32]) -> [f32; OUTPUTS] {
-        self.forward_plain(input)
+    fn forward_avx2(&self, input: &[f32], out: &mut [f32]) {
+        self.forward_plain(input, out);
     }
 
     #[inline(always)]
-    fn forward_plain(&self, input: &[f32]) -> [f32; OUTPUTS] {
-        let mut values = [[0.0_f32; BLOCK]; WIDEST / BLOCK];
+    fn forward_plain(&self, input: &[f32], out: &mut [f32]) {
+        let mut values = [0.0_f32; WIDEST];
         let mut active = [(0_usize, 0.0_f32); WIDEST];
         let mut count = input.len();
         for (i, &v) in input.iter().enumerate() {
             active[i] = (i, v);
         }
         let last = self.layers.len() - 1;
-        for (layer, outputs) in self.layers.iter().zip(&LAYERS[1..]).take(last) {
-            layer.forward(&active[..count], &mut values);
+        for layer in &self.layers[..last] {
+            layer.forward(&active[..count], &mut values[..layer.outputs]);
             // ReLU, keeping the positive ones; written without a branch.
             count = 0;
-            for (i, &v) in values.as_flattened()[..*outputs].iter().enumerate() {
+            for (i, &v) in values[..layer.outputs].iter().enumerate() {
                 active[count] = (i, v);
                 count += usize::from(v > 0.0);
             }
         }
-        self.layers[last].forward(&active[..count], &mut values);
-        std::array::from_fn(|i| values[0][i])
+        self.layers[last].forward(&active[..count], out);
     }
 }
 
@@ -182,12 +192,14 @@ mod tests {
     #[test]
     fn equals_the_textbook_sum_and_itself_without_avx2() {
         let weights = random_weights(5);
-        let network = Network::new(Features::COUNT, &weights);
+        let network = Network::new(&LAYERS, &weights);
         for i in 0..20 {
             let input: [f32; 6] =
                 std::array::from_fn(|j| ((i * 7 + j * 3) % 11) as f32 / 5.0 - 1.0);
-            let got = network.forward(&input);
-            assert_eq!(got, network.forward_plain(&input));
+            let got: [f32; OUTPUTS] = network.forward(&input);
+            let mut plain = [0.0; OUTPUTS];
+            network.forward_plain(&input, &mut plain);
+            assert_eq!(got, plain);
             for (g, e) in got.iter().zip(reference(&weights, input)) {
                 assert!((g - e).abs() < 1e-4, "input {i}: {g} against {e}");
             }

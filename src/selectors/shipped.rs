@@ -13,6 +13,7 @@ pub static FILES: &[(&str, &[u8])] = &[
     ("mlp-parallel.safetensors", include_bytes!("../../models/mlp-parallel.safetensors")),
     ("mlp-reverse.safetensors", include_bytes!("../../models/mlp-reverse.safetensors")),
     ("fleet.safetensors", include_bytes!("../../models/fleet.safetensors")),
+    ("foresight.safetensors", include_bytes!("../../models/foresight.safetensors")),
 ];
 
 /// Nothing is compiled in.
@@ -29,14 +30,19 @@ mod tests {
     use std::borrow::Cow;
 
     use super::*;
+    use crate::selectors::foresight::Foresight;
     use crate::selectors::model::Model;
 
     /// As files they pass every check, the checksum too.
     #[test]
     fn what_is_compiled_in_is_whole() {
         for (name, bytes) in FILES {
-            let model = Model::from_bytes(Path::new(name), Cow::Owned(bytes.to_vec())).unwrap();
-            assert!(!model.kinds().is_empty(), "{name}");
+            if *name == "foresight.safetensors" {
+                assert!(Foresight::from_bytes(Path::new(name), bytes).is_ok());
+            } else {
+                let model = Model::from_bytes(Path::new(name), Cow::Owned(bytes.to_vec())).unwrap();
+                assert!(!model.kinds().is_empty(), "{name}");
+            }
             assert_eq!(find(Path::new(name)), Some(*bytes));
         }
         assert_eq!(find(Path::new("./knn.bin")), None, "a path is that of a file");

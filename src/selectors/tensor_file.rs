@@ -171,6 +171,8 @@ pub enum Content {
     Policy,
     /// Manoeuvres and networks for any vehicle.
     Fleet,
+    /// What manoeuvres are worth in a scene.
+    Foresight,
 }
 
 impl Content {
@@ -183,6 +185,7 @@ impl Content {
         match () {
             () if has("course") => Self::Policy,
             () if has("fleet") => Self::Fleet,
+            () if has("foresight") => Self::Foresight,
             () => Self::Mlp,
         }
     }

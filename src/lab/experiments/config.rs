@@ -9,6 +9,7 @@ use crate::lab::dataset::{CollectConfig, Subset};
 use crate::lab::evaluation::SuiteConfig;
 use crate::lab::evaluation::suite::{self, Drawn, MAX_COUNT, World};
 use crate::lab::training::MlpConfig;
+use crate::lab::training::foresight::ForesightConfig;
 use crate::lab::training::mlp::check_kind;
 use crate::lab::training::rl::RlConfig;
 use crate::lab::training::worlds::WorldsConfig;
@@ -64,6 +65,10 @@ pub struct TrainConfig {
     pub knn: WorldsConfig,
     /// The networks, as in `n3p-train mlp --config`, without `seed`.
     pub mlp: MlpConfig,
+    /// Foresight, as in `n3p-train foresight --config`, without `seed`; the usual one serves where this is
+    /// left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub foresight: Option<ForesightConfig>,
     /// The policies, as in `n3p-train rl --config`, without `seed` and `vehicle`.
     pub rl: RlConfig,
 }
@@ -250,6 +255,9 @@ impl ExperimentConfig {
         self.collect.seed = self.seed;
         self.train.knn.seed = self.seed;
         self.train.mlp.seed = self.seed;
+        if let Some(foresight) = &mut self.train.foresight {
+            foresight.seed = self.seed;
+        }
         self.train.rl.seed = self.seed;
         self.train.rl.vehicle = self.vehicle;
         self
@@ -270,6 +278,9 @@ impl ExperimentConfig {
         self.collect.validate().map_err(|e| format!("collect: {e}"))?;
         self.train.knn.validate().map_err(|e| format!("train.knn: {e}"))?;
         self.train.mlp.validate().map_err(|e| format!("train.mlp: {e}"))?;
+        if let Some(foresight) = &self.train.foresight {
+            foresight.validate().map_err(|e| format!("train.foresight: {e}"))?;
+        }
         if self.needs_mlp() {
             let mut kinds = self.evaluate.types.iter();
             let check = |&kind: &ParkingType| check_kind(kind);
@@ -372,6 +383,7 @@ fn misplaced(written: &toml::Table) -> Option<&'static str> {
         "collect.vehicle",
         "train.knn.seed",
         "train.mlp.seed",
+        "train.foresight.seed",
         "train.rl.seed",
         "train.rl.vehicle",
     ];

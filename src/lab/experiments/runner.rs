@@ -37,7 +37,7 @@ use crate::lab::progress;
 use crate::lab::rl::policy_file;
 use crate::lab::training::rl::{Begin, checkpoint_path};
 use crate::lab::training::{self, TrainingError};
-use crate::n3p::{Models, ModelsError};
+use crate::n3p::{FORESIGHT, Models, ModelsError};
 use crate::selectors::artefact::ArtefactError;
 use crate::world::ParkingType;
 
@@ -187,7 +187,14 @@ pub fn run(
         runner.train_policies()?;
     }
     let rl = config.courses().next().map(|_| &config.train.rl);
-    let trained = settings((&data_id, &config.train.knn, &config.train.mlp, rl, &policies));
+    let trained = settings((
+        &data_id,
+        &config.train.knn,
+        &config.train.mlp,
+        &config.train.foresight,
+        rl,
+        &policies,
+    ));
     runner.evaluate(runner.ready()?, &trained, &curve)
 }
 
@@ -300,6 +307,7 @@ impl Runner<'_> {
             training::knn::train(&set.metadata, &set.samples, kinds, &config, &knn)?;
             self.stages.finish("train-knn", &knn_settings)?;
         }
+        self.train_foresight(&knn, &knn_settings)?;
         if !self.config.needs_mlp() {
             return Ok(());
         }
@@ -319,6 +327,20 @@ impl Runner<'_> {
                 log.validation.position_median_m
             );
             self.stages.finish(&stage, &mlp_settings)?;
+        }
+        Ok(())
+    }
+
+    /// Trains foresight with the manoeuvres of `knn`, if the experiment wants its own.
+    fn train_foresight(&self, knn: &Path, knn_settings: &str) -> Result<(), ExperimentError> {
+        let Some(config) = &self.config.train.foresight else { return Ok(()) };
+        let (stage, out) = ("train-foresight", self.model(FORESIGHT));
+        let settings = settings((stage, knn_settings, config));
+        if self.stages.begin(stage, &settings, out.exists())? != Todo::Nothing {
+            let models = training::foresight::load(&[knn]).map_err(ModelsError::from)?;
+            let log = training::foresight::train(models, config, &out)?;
+            tracing::info!("{stage}: best of {} epochs is {}", log.losses.len(), log.best_epoch);
+            self.stages.finish(stage, &settings)?;
         }
         Ok(())
     }
@@ -413,6 +435,8 @@ impl Runner<'_> {
                 files.push(folder.join("knn.bin"));
             }
             files.extend(is_apart.then_some(angled));
+            let foresight = folder.join(FORESIGHT);
+            files.extend(foresight.exists().then_some(foresight));
         }
         if self.config.needs_mlp() {
             let network = |kind| folder.join(format!("mlp-{kind}.safetensors"));

@@ -5,21 +5,24 @@
 //! one data set; [`fleet`] does both for the data sets of several vehicles. All write an artefact
 //! that [`crate::selectors`] loads. Beside it they leave what programs
 //! and people want to know of it: a log ([`log_path`]), with its [`quality`], and a model card
-//! ([`card_path`]).
+//! ([`card_path`]). While they train they tell what they do, line by line ([`watch`]).
 
 mod card;
 pub mod curve;
 pub mod fleet;
+pub mod foresight;
 pub mod knn;
 mod leave_one_out;
 pub mod library;
 pub mod mlp;
 mod mlp_config;
+pub mod onnx;
 pub mod quality;
 mod regression;
 pub mod rl;
 mod settings;
 mod targets;
+pub mod watch;
 pub mod worlds;
 
 pub use mlp_config::{Loss, MlpConfig, Schedule, Targets, Validation};
@@ -45,6 +48,9 @@ pub enum TrainingError {
         "no network is trained for type {0}: networks do not see how a bay slants; n3p-train knn learns of it"
     )]
     NoNetwork(ParkingType),
+    /// No scene to learn from.
+    #[error("no world drawn has room for the vehicle; ask for more worlds")]
+    NoWorlds,
     /// Too few to train and validate.
     #[error("the data set has {samples} solved samples of type {kind}; at least {needed} needed")]
     TooFew {

@@ -7,7 +7,8 @@ use candle_core::{DType, Device, Tensor, Var};
 use rand::RngExt;
 use rand::seq::SliceRandom;
 
-use super::curve::EpochLoss;
+use super::curve::{EpochLine, EpochLoss};
+use super::watch::Watch;
 use super::{Loss, MlpConfig, TrainingError};
 use crate::geometry::Pose;
 use crate::lab::nn::AdamW;
@@ -19,13 +20,14 @@ use crate::selectors::network::{LayerWeights, OUTPUTS, pose_from_outputs};
 /// Trains `model` until the epochs or the patience of `config` run out, and returns the losses.
 ///
 /// Whenever the validation loss is the least so far `improved` is told the losses up to then; it
-/// answers with what the progress bar, called `name`, is to say of the model.
+/// answers with what the progress bar, called `name`, is to say of the model. Every epoch becomes a line
+/// of `watch`.
 pub(super) fn fit<const N: usize>(
     model: &Trainable,
     train: &Rows<N>,
     validation: &Rows<N>,
     config: &MlpConfig,
-    name: &str,
+    (name, watch): (&str, &mut Watch),
     mut improved: impl FnMut(&[EpochLoss]) -> Result<String, TrainingError>,
 ) -> Result<Vec<EpochLoss>, TrainingError> {
     let mut optimiser = AdamW::new(&model.vars, config.weight_decay)?;
@@ -45,6 +47,8 @@ pub(super) fn fit<const N: usize>(
             return Err(TrainingError::Diverged { epoch: epoch + 1, loss: loss.train });
         }
         losses.push(loss);
+        let (epochs, learning_rate) = (config.epochs, config.rate(epoch));
+        watch.tell(&EpochLine { name, epoch: epoch + 1, epochs, learning_rate, loss })?;
         if loss.validation < best {
             (best, best_epoch) = (loss.validation, epoch + 1);
             said = improved(&losses)?;
@@ -118,8 +122,24 @@ impl Trainable {
         Ok(Self { vars })
     }
 
-    /// `[batch, inputs]` → `[batch, 4]`, both normalised.
-    fn forward(&self, inputs: &Tensor) -> candle_core::Result<Tensor> {
+    /// Layers of these widths with weights that [`Trainable::weights`] gave.
+    pub fn of(layers: &[usize], weights: &[LayerWeights]) -> candle_core::Result<Self> {
+        let mut vars = Vec::new();
+        for (size, LayerWeights { weight, bias }) in layers.windows(2).zip(weights) {
+            let weight = Tensor::from_slice(weight, (size[1], size[0]), &Device::Cpu)?;
+            vars.push(Var::from_tensor(&weight.t()?.contiguous()?)?);
+            vars.push(Var::from_slice(bias, size[1], &Device::Cpu)?);
+        }
+        Ok(Self { vars })
+    }
+
+    /// What is learnt.
+    pub fn vars(&self) -> &[Var] {
+        &self.vars
+    }
+
+    /// `[batch, inputs]` → `[batch, outputs]`, both normalised.
+    pub fn forward(&self, inputs: &Tensor) -> candle_core::Result<Tensor> {
         let last = self.vars.len() / 2 - 1;
         let mut x = inputs.clone();
         for (n, layer) in self.vars.chunks_exact(2).enumerate() {

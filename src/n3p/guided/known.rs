@@ -1,12 +1,16 @@
 //! What `n3p` knows without a search: the manoeuvres of its library, and what they say about a plan.
 
+use std::sync::OnceLock;
+
 use super::GuidedPlanner;
 use crate::curves::{Path, Segment};
 use crate::planners::cost::CostModel;
 use crate::planners::hybrid_astar::{GoalSet, HybridAStar, Leg};
 use crate::planners::library::{Library, LibraryPlan};
 use crate::planners::{Effort, Guidance, Problem, Route};
-use crate::vehicle::Gear;
+use crate::selectors::PoseSelector;
+use crate::selectors::foresight::{self, Codes, Foresight};
+use crate::vehicle::{Gear, Vehicle};
 use crate::world::abstraction::abstractions;
 use crate::world::cell::{Axis, Grid};
 use crate::world::{ParkingType, Stance};
@@ -37,7 +41,7 @@ const TO_AND_FRO: usize = 4;
 const INTO_A_BAY: usize = 2;
 /// Where the lane begins farther out than this beyond a usual spot's, metres for the default vehicle,
 /// manoeuvres are tried that end farther out, too.
-const DEEPER: f64 = 0.3;
+pub(super) const DEEPER: f64 = 0.3;
 /// Shorter parallel spots than this are unusual, metres for the default vehicle: manoeuvres were learnt
 /// for all others (see [`wide`](crate::world::generate::wide)).
 const LEAST_GAP: f64 = 5.8;
@@ -45,17 +49,72 @@ const LEAST_GAP: f64 = 5.8;
 const LONG_WAYS: usize = 8;
 
 /// A library made ready for a way to stand parked and a footprint.
-pub(super) struct Prepared {
-    stance: Stance,
-    library: Library,
+pub(crate) struct Prepared {
+    pub(super) stance: Stance,
+    pub(crate) library: Library,
     /// From this number on its manoeuvres are none but the straight into the spot, or nothing at
     /// all: what joins them is the curve straight to the goal.
-    straights: usize,
+    pub(super) straights: usize,
     /// Manoeuvres that are rarely of use.
-    rare: Library,
+    pub(crate) rare: Library,
+    /// What foresight knows of the library's manoeuvres, where there is foresight, and, once they are
+    /// asked for, of those rarely of use.
+    pub(super) codes: Option<(Codes, OnceLock<Codes>)>,
 }
 
 impl Prepared {
+    /// Makes what `selector` knows ready for problems like this one; `None` where no spot is known.
+    pub(crate) fn new(
+        selector: &dyn PoseSelector,
+        hars: &HybridAStar,
+        problem: &Problem,
+        foresight: Option<&Foresight>,
+    ) -> Option<Self> {
+        let stance = problem.stance()?;
+        let (vehicle, footprint) = (&problem.vehicle, *problem.collision.footprint());
+        let manoeuvres = selector.manoeuvres(stance, vehicle);
+        let cost = hars.cost(vehicle);
+        let (common, rare) = manoeuvres.split_at(COMMON.min(manoeuvres.len()));
+        let prepared = |all| Library::new(all, vehicle, footprint, &cost);
+        let (mut library, rare) = (prepared(common), prepared(rare));
+        let straights = library.len();
+        for entry in hars.entry_straights(problem) {
+            library.add(entry, &cost);
+        }
+        let mut prepared = Self { stance, library, straights, rare, codes: None };
+        prepared.codes = foresight.map(|foresight| {
+            let codes = foresight.codes(&prepared.values(&prepared.library, vehicle));
+            (codes, OnceLock::new())
+        });
+        Some(prepared)
+    }
+
+    /// What says what each manoeuvre of one of the libraries is.
+    pub(crate) fn values(
+        &self,
+        library: &Library,
+        vehicle: &Vehicle,
+    ) -> Vec<[f32; foresight::MANOEUVRE]> {
+        let values =
+            |(motions, cost)| foresight::manoeuvre_values(self.stance, vehicle, motions, cost);
+        library.manoeuvres().map(values).collect()
+    }
+
+    /// A plan by one of its manoeuvres.
+    pub(super) fn known(&self, plan: LibraryPlan, least: f64) -> Known {
+        let is_straight = plan.manoeuvre >= self.straights;
+        let preparatory = (!is_straight).then_some(plan.preparatory);
+        let route = if is_straight { Route::Direct } else { Route::Library };
+        let guidance = Guidance { preparatory, route };
+        Known { path: plan.path, cost: plan.cost, guidance, least, foreseen: None }
+    }
+
+    /// The least estimates of manoeuvres and of the curve straight to the goal, of all `estimates`.
+    pub(crate) fn least(&self, estimates: &[f32]) -> [f64; 2] {
+        let (manoeuvres, straights) = estimates.split_at(self.straights);
+        [manoeuvres, straights].map(|of| of.iter().copied().fold(f32::INFINITY, f32::min).into())
+    }
+
     /// Whether it was made ready for such problems.
     fn serves(&self, problem: &Problem) -> bool {
         problem.stance() == Some(self.stance) && self.library.fits(problem)
@@ -109,6 +168,25 @@ pub(super) struct Known {
     pub(super) guidance: Guidance,
     /// An estimate of what the best plan costs.
     pub(super) least: f64,
+    /// What the best plan was foreseen to cost.
+    pub(super) foreseen: Option<f64>,
+}
+
+/// A plan by a manoeuvre that is rarely of use.
+pub(super) fn rarely_used(plan: LibraryPlan, least: f64) -> Known {
+    let LibraryPlan { path, cost, preparatory, .. } = plan;
+    let guidance = Guidance { preparatory: Some(preparatory), route: Route::Library };
+    Known { path, cost, guidance, least, foreseen: None }
+}
+
+/// An estimate of what the best plan costs, by those of the cheapest manoeuvre and of the curve straight
+/// to the goal. Into a bay a curve may lead straight; a parallel spot takes some to and fro as a rule.
+pub(super) fn least(problem: &Problem, model: &CostModel, estimates: (f64, f64)) -> f64 {
+    let to_and_fro = match problem.kind {
+        Some(ParkingType::Parallel) => TO_AND_FRO as f64 * model.gear_change,
+        _ => 0.0,
+    };
+    estimates.0.min(estimates.1 + to_and_fro)
 }
 
 /// Times the estimate of the best that a plan of so many changes may cost. Nearly all that cost more can
@@ -134,34 +212,30 @@ pub(super) fn most_changes(kind: Option<ParkingType>) -> usize {
 }
 
 impl GuidedPlanner {
+    /// The cheapest of what is known without a search, as foreseen, or else as estimates say.
+    pub(super) fn look_up(&mut self, problem: &Problem, goal: &GoalSet) -> Option<Known> {
+        self.look_ahead(problem).or_else(|| self.by_estimates(problem, goal))
+    }
+
     /// The cheapest of what is known without a search: manoeuvres of the library prepared last, and
     /// the curve straight to the goal where none of the first can be joined.
-    pub(super) fn look_up(&mut self, problem: &Problem, goal: &GoalSet) -> Option<Known> {
+    fn by_estimates(&mut self, problem: &Problem, goal: &GoalSet) -> Option<Known> {
         let Self { libraries, library_search, verdicts, hars, .. } = self;
         let cost = hars.cost(&problem.vehicle);
-        let Prepared { library, straights, .. } = &libraries[0];
+        let prepared = &libraries[0];
         verdicts.clear();
         let any = f64::INFINITY;
+        let library = &prepared.library;
         let mut look_up = library_search.look_up(library, verdicts, problem, &cost, any);
-        let (manoeuvre, curve) = look_up.least_estimates(*straights);
-        // Into a bay a curve may lead straight; a parallel spot takes some to and fro as a rule.
-        let to_and_fro = match problem.kind {
-            Some(ParkingType::Parallel) => TO_AND_FRO as f64 * cost.gear_change,
-            _ => 0.0,
-        };
-        let least = manoeuvre.min(curve + to_and_fro);
-        let by_manoeuvre = |plan: LibraryPlan| {
-            let is_straight = plan.manoeuvre >= *straights;
-            let preparatory = (!is_straight).then_some(plan.preparatory);
-            let route = if is_straight { Route::Direct } else { Route::Library };
-            let guidance = Guidance { preparatory, route };
-            Known { path: plan.path, cost: plan.cost, guidance, least }
-        };
+        let least = least(problem, &cost, look_up.least_estimates(prepared.straights));
+        let by_manoeuvre = |plan| prepared.known(plan, least);
         let mut best = look_up.next(any, FIRST_TRIES).map(by_manoeuvre);
         if best.is_none() {
             let guidance = Guidance { preparatory: None, route: Route::Direct };
             let direct = hars.direct(problem, problem.start, goal);
-            let direct = direct.map(|Leg { path, cost, .. }| Known { path, cost, guidance, least });
+            let known =
+                |Leg { path, cost, .. }| Known { path, cost, guidance, least, foreseen: None };
+            let direct = direct.map(known);
             let bound = direct.as_ref().map_or(any, |known| known.cost);
             let tries = if direct.is_some() { FIRST_TRIES } else { TRIES };
             best = look_up.next(bound, tries).map(by_manoeuvre).or(direct);
@@ -194,9 +268,7 @@ impl GuidedPlanner {
         let mut look_up = library_search.look_up(rare, verdicts, problem, model, bound);
         let known = best.as_ref().map(|known| known.cost);
         let Some(plan) = look_up.cheapest(known, bound, TRIES) else { return best };
-        let LibraryPlan { path, cost, preparatory, .. } = plan;
-        let guidance = Guidance { preparatory: Some(preparatory), route: Route::Library };
-        Some(Known { path, cost, guidance, least })
+        Some(rarely_used(plan, least))
     }
 
     /// The best so far, or a plan by a manoeuvre that ends where a usual bay's goal would be, farther
@@ -230,27 +302,25 @@ impl GuidedPlanner {
         let cost = model.path(&problem.vehicle, &path.segments);
         let guidance = Guidance { preparatory: Some(preparatory), route: Route::Library };
         let least = best.map_or(f64::INFINITY, |known| known.least).min(least + in_cost);
-        Some(Known { path, cost, guidance, least })
+        Some(Known { path, cost, guidance, least, foreseen: None })
     }
 
     /// Puts the library for `problem` first, prepared if need be, and says whether there is one.
     pub(super) fn prepare_library(&mut self, problem: &Problem) -> bool {
-        let Some(stance) = problem.stance() else { return false };
+        if problem.kind.is_none() {
+            return false;
+        }
         match self.libraries.iter().position(|p| p.serves(problem)) {
             Some(at) => self.libraries[..=at].rotate_right(1),
             None => {
-                let (vehicle, footprint) = (&problem.vehicle, *problem.collision.footprint());
-                let manoeuvres = self.selector.manoeuvres(stance, vehicle);
-                let cost = self.hars.cost(vehicle);
-                let (common, rare) = manoeuvres.split_at(COMMON.min(manoeuvres.len()));
-                let prepared = |all| Library::new(all, vehicle, footprint, &cost);
-                let (mut library, rare) = (prepared(common), prepared(rare));
-                let straights = library.len();
-                for entry in self.hars.entry_straights(problem) {
-                    library.add(entry, &cost);
-                }
+                let Self { selector, hars, foresight, .. } = self;
+                // It has not learnt of slants.
+                let foresight =
+                    foresight.as_deref().filter(|_| problem.kind != Some(ParkingType::Angled));
+                let prepared = Prepared::new(selector.as_ref(), hars, problem, foresight);
+                let Some(prepared) = prepared else { return false };
                 self.libraries.truncate(LIBRARIES - 1);
-                self.libraries.insert(0, Prepared { stance, library, straights, rare });
+                self.libraries.insert(0, prepared);
             }
         }
         self.libraries[0].straights > 0
@@ -260,6 +330,9 @@ impl GuidedPlanner {
     /// than [`dear`] allows over the library's estimate. With the usual changes of gear that is much,
     /// since manoeuvres for them were learnt in many worlds; by an unusual spot it is at most twice.
     pub(super) fn is_usual(&mut self, known: &Known, standard: &mut Standard) -> bool {
+        if let Some(is_as_foreseen) = known.is_as_foreseen() {
+            return is_as_foreseen || known.cost <= standard.enough(&mut self.hars);
+        }
         if known.cost <= USUAL * known.least || known.cost <= standard.enough(&mut self.hars) {
             return true;
         }

@@ -1,0 +1,88 @@
+//! What `n3p` foresees: which known manoeuvres to try first, and what a plan may cost.
+
+use super::GuidedPlanner;
+use super::known::{DEEPER, Known, least, rarely_used};
+use crate::planners::Problem;
+use crate::selectors::foresight::{Codes, Outlook};
+
+/// So many of the most promising manoeuvres are tried.
+const PROMISING: usize = 16;
+/// What costs so little of what is foreseen is taken at once.
+const AT_ONCE: f64 = 0.95;
+/// A plan will do that costs at most so many times what is foreseen; one that costs so many times as much
+/// is searched for once more. Both chosen in the world "wide", seed 92.
+const WILL_DO: f64 = 1.2;
+pub(super) const FAR_FROM_FORESEEN: f64 = 1.4;
+impl Known {
+    /// Whether it costs about what the best plan was foreseen to cost, or less; `None` without foresight.
+    pub(super) fn is_as_foreseen(&self) -> Option<bool> {
+        self.foreseen.map(|foreseen| self.cost <= WILL_DO * foreseen)
+    }
+}
+
+/// The manoeuvres of a library in the order in which foresight would try them; buffers are reused.
+#[derive(Default)]
+pub(super) struct Ranking {
+    outlook: Outlook,
+    scores: Vec<f32>,
+    order: Vec<u32>,
+}
+
+impl Ranking {
+    /// The most promising manoeuvres come first; the others are left out.
+    fn order(&mut self, codes: &Codes, estimates: &[f32]) -> &[u32] {
+        let Self { outlook, scores, order } = self;
+        codes.scores(outlook, estimates, scores);
+        order.clear();
+        let score = |index: u32| scores[index as usize];
+        for index in 0..scores.len() as u32 {
+            if order.len() == PROMISING && score(index) <= score(order[PROMISING - 1]) {
+                continue;
+            }
+            order.truncate(PROMISING - 1);
+            let at = order.partition_point(|&better| score(better) >= score(index));
+            order.insert(at, index);
+        }
+        order
+    }
+}
+
+impl GuidedPlanner {
+    /// The cheapest of the most promising manoeuvres, first of those in common use, then, where none of these
+    /// costs about as little as foreseen, of the others; `None` where none can be driven or nothing
+    /// is foreseen.
+    pub(super) fn look_ahead(&mut self, problem: &Problem) -> Option<Known> {
+        let Self { libraries, library_search, verdicts, hars, foresight, ranking, .. } = self;
+        let prepared = &libraries[0];
+        let (foresight, (codes, of_rare)) = foresight.as_ref().zip(prepared.codes.as_ref())?;
+        // It has not seen deeper bays.
+        if problem.mouth > DEEPER * problem.vehicle.scale() {
+            return None;
+        }
+        let cost = hars.cost(&problem.vehicle);
+        let library = &prepared.library;
+        verdicts.clear();
+        let any = f64::INFINITY;
+        let mut look_up = library_search.look_up(library, verdicts, problem, &cost, any);
+        let estimates = look_up.least_estimates(prepared.straights);
+        let least = least(problem, &cost, estimates);
+        ranking.outlook = foresight.look(problem, prepared.stance, [estimates.0, estimates.1]);
+        let foreseen = ranking.outlook.cost;
+        let order = ranking.order(codes, look_up.estimates());
+        let first = look_up.promising(order, any, AT_ONCE * foreseen);
+        let mut best = first.map(|plan| prepared.known(plan, least));
+        let bound = best.as_ref().map_or(any, |known| known.cost);
+        if bound > WILL_DO * foreseen {
+            verdicts.clear();
+            let rare = &prepared.rare;
+            let codes =
+                of_rare.get_or_init(|| foresight.codes(&prepared.values(rare, &problem.vehicle)));
+            let mut look_up = library_search.look_up(rare, verdicts, problem, &cost, bound);
+            let order = ranking.order(codes, look_up.estimates());
+            if let Some(plan) = look_up.promising(order, bound, AT_ONCE * foreseen) {
+                best = Some(rarely_used(plan, least));
+            }
+        }
+        best.map(|known| Known { foreseen: Some(foreseen), ..known })
+    }
+}
