@@ -12,7 +12,7 @@ use crate::selectors::fleet::UNIT_LAYERS;
 use crate::selectors::foresight::{MANOEUVRE_LAYERS, SCENE_LAYERS};
 use crate::selectors::network::{LAYERS, LayerWeights};
 use crate::selectors::tensor_file::{self, Content};
-use crate::selectors::{Normaliser, fleet, foresight, mlp};
+use crate::selectors::{Normaliser, fleet, foresight, knn_file, mlp};
 
 /// Version of the operators (ONNX opset) and of the format.
 const OPERATORS: u64 = 13;
@@ -52,6 +52,9 @@ fn networks(bytes: &[u8]) -> Result<Vec<Dense>, Fault> {
         let output = Some(normaliser(&header["output"]).map_err(damaged)?);
         Ok::<_, Fault>(Dense { suffix, layers, input, output })
     };
+    if bytes.starts_with(&knn_file::MAGIC) {
+        return Err(Fault::NoNetwork);
+    }
     match Content::of_file(bytes) {
         Content::Policy => Err(Fault::NoNetwork),
         Content::Mlp => {
