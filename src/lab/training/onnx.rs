@@ -258,10 +258,9 @@ mod tests {
         let expected = ["foresight-scene.onnx", "foresight-manoeuvre.onnx"];
         assert!(names.eq(expected), "{files:?}");
         assert_eq!(run(&files[0], &[0.5; foresight::SCENE]).len(), foresight::CODE + 2);
-        for (name, part) in [("knn.bin", "not a model"), ("rl-eval.safetensors", "no network that")]
-        {
+        for name in ["knn.bin", "rl-eval.safetensors"] {
             let error = export(&model(name), dir.path()).unwrap_err().to_string();
-            assert!(error.contains(part), "{error}");
+            assert!(error.contains("no network that"), "{error}");
         }
     }
 }
