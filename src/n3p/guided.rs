@@ -288,9 +288,8 @@ impl GuidedPlanner {
         let is_dear = cost > limit
             && cost > standard.enough(&mut self.hars)
             && (foreseen.is_some() || standard.is_unusual());
-        let doubtful = foreseen.is_none()
-            && refined.direction_changes() > most_changes(problem.kind)
-            && cost > DOUBTFUL * least;
+        let doubtful =
+            refined.direction_changes() > most_changes(problem.kind) && cost > DOUBTFUL * least;
         if is_dear {
             refined = self.or_searched(problem, goal, refined, UNUSUAL_SEARCH, false, left);
         } else if doubtful {

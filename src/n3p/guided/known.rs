@@ -326,19 +326,21 @@ impl GuidedPlanner {
         self.libraries[0].straights > 0
     }
 
-    /// Whether a plan costs no more than usual: little more than the least through empty space, or no more
-    /// than [`dear`] allows over the library's estimate. With the usual changes of gear that is much,
-    /// since manoeuvres for them were learnt in many worlds; by an unusual spot it is at most twice.
+    /// Whether a plan costs no more than usual: little more than the least through empty space, or about
+    /// what was foreseen; without foresight no more than [`dear`] allows over the library's estimate. With the
+    /// usual changes of gear that is much, since manoeuvres for them were learnt in many worlds. By an
+    /// unusual spot it is at most twice the estimate.
     pub(super) fn is_usual(&mut self, known: &Known, standard: &mut Standard) -> bool {
-        if let Some(is_as_foreseen) = known.is_as_foreseen() {
-            return is_as_foreseen || known.cost <= standard.enough(&mut self.hars);
-        }
-        if known.cost <= USUAL * known.least || known.cost <= standard.enough(&mut self.hars) {
+        if known.cost <= standard.enough(&mut self.hars) {
             return true;
         }
         let times = known.cost / known.least.max(standard.least(&mut self.hars));
-        let limit = dear(standard.problem, known.path.direction_changes());
-        times <= limit && (times <= DEAR_BY_UNUSUAL || !standard.is_unusual())
+        let is_like_others = match known.is_as_foreseen() {
+            Some(is_as_foreseen) => is_as_foreseen,
+            None if known.cost <= USUAL * known.least => return true,
+            None => times <= dear(standard.problem, known.path.direction_changes()),
+        };
+        is_like_others && (times <= DEAR_BY_UNUSUAL || !standard.is_unusual())
     }
 
     /// What is known, or the rest of the manoeuvre that the car stands in where that costs less: who

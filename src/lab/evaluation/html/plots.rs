@@ -1,6 +1,7 @@
 //! Plots as SVG, drawn here so that they need no script: one panel for each type and level,
 //! one line in it for each method. Colours come from the page's style sheet.
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use serde::Serialize;
@@ -10,6 +11,7 @@ use super::super::table::{self, figures, kind_name, part_name};
 use super::tables::paper_ratio;
 use super::{escape, family};
 use crate::episode::Row;
+use crate::world::ParkingType;
 
 /// Dots drawn in a line; of more scenes, so many evenly spaced ranks.
 pub const DOTS: usize = 150;
@@ -58,6 +60,8 @@ enum Mark {
     Values { solved: Vec<f64>, failed: Vec<f64> },
     /// A number with its interval, and the paper's number.
     Ratio { ratio: f64, low: f64, high: f64, paper: Option<f64> },
+    /// A number at home and one away, each where there are such scenes.
+    HomeAndAway { home: Option<f64>, away: Option<f64> },
 }
 
 /// A logarithmic axis over whole decades.
@@ -120,6 +124,54 @@ pub fn speed_ups(groups: &[Group], methods: &[&str]) -> Plot {
         value: |v| format!("{} ×", figures(v)),
     };
     Plot::new("Speed-ups", axis, true, groups, methods, mark)
+}
+
+/// How much faster than `ha-rs` methods are by mean, at home (all levels together) and away (all other
+/// sets): one panel for each parking type. Empty unless the run has both and `ha-rs` among its methods.
+pub fn home_and_away(methods: &[&str], rows: &[Row]) -> Vec<PanelView> {
+    const HOME: &str = "home";
+    const REFERENCE: &str = "ha-rs";
+    let sets: BTreeSet<&str> = rows.iter().map(|r| r.set.as_str()).collect();
+    if !sets.contains(HOME) || sets.len() < 2 || !methods.contains(&REFERENCE) {
+        return Vec::new();
+    }
+    let mean = |kind: Option<ParkingType>, is_home: bool, method: &str| {
+        let is_one = |r: &&Row| {
+            r.kind == kind && (r.set == HOME) == is_home && r.method == method && r.applies()
+        };
+        let times: Vec<f64> = rows.iter().filter(is_one).map(|r| r.plan_time_s).collect();
+        (!times.is_empty()).then(|| times.iter().sum::<f64>() / times.len() as f64)
+    };
+    let mark = |kind: Option<ParkingType>, method: &str| {
+        if method == REFERENCE {
+            return Mark::Reference;
+        }
+        let [home, away] = [true, false].map(|is_home| {
+            Some(mean(kind, is_home, REFERENCE)? / mean(kind, is_home, method)?.max(1e-9))
+        });
+        match (home, away) {
+            (None, None) => Mark::Nothing,
+            _ => Mark::HomeAndAway { home, away },
+        }
+    };
+    let kinds: BTreeSet<Option<ParkingType>> = rows.iter().map(|r| r.kind).collect();
+    let panel = |&kind: &Option<ParkingType>| Panel {
+        level: "home and away".to_owned(),
+        kind: kind_name(kind),
+        lines: methods.iter().map(|m| ((*m).to_owned(), mark(kind, m))).collect(),
+    };
+    let panels: Vec<Panel> = kinds.iter().map(panel).collect();
+    let axis = Axis {
+        title: "times as fast as ha-rs, by mean",
+        low: 0,
+        high: 0,
+        zero: false,
+        tick: times_faster,
+        value: |v| format!("{} ×", figures(v)),
+    };
+    let marks = panels.iter().flat_map(|p| &p.lines).map(|(_, mark)| mark);
+    let axis = axis.around(marks.flat_map(Mark::values));
+    Plot { what: "Home against away", axis, unity: true, panels }.panels()
 }
 
 fn values(
@@ -234,6 +286,10 @@ impl Plot {
                     all.len()
                 )
             }
+            Mark::HomeAndAway { home, away } => {
+                let of = |v: &Option<f64>| v.map_or("no scenes".to_owned(), text);
+                format!("at home {}, away {}", of(home), of(away))
+            }
             Mark::Ratio { ratio, low, high, paper } => {
                 let paper = paper.map_or(String::new(), |p| format!(", in the paper {}", text(p)));
                 format!("{} ({} to {}){paper}", text(*ratio), text(*low), text(*high))
@@ -276,6 +332,21 @@ impl Plot {
             Mark::Reference => {
                 let d = format!("M{} {}l5 5l-5 5l-5-5z", x(1.0), y - 5.0);
                 let _ = write!(svg, "<path class=\"mean ref\" d=\"{d}\"/>");
+            }
+            Mark::HomeAndAway { home, away } => {
+                if let (Some(home), Some(away)) = (home, away) {
+                    let _ =
+                        write!(svg, "<path class=\"ci\" d=\"M{} {y}H{}\"/>", x(*home), x(*away));
+                }
+                for (value, class) in [(away, "mean ref"), (home, "mean")] {
+                    if let Some(value) = value {
+                        let cx = x(*value);
+                        let _ = write!(
+                            svg,
+                            "<circle class=\"{class}\" cx=\"{cx}\" cy=\"{y}\" r=\"4.5\"/>"
+                        );
+                    }
+                }
             }
             Mark::Ratio { ratio, low, high, paper } => {
                 // Ours above, the paper's below: neither hides the other.
@@ -328,6 +399,7 @@ impl Mark {
             Mark::Nothing => Vec::new(),
             Mark::Reference => vec![1.0],
             Mark::Values { solved, failed } => merged(solved, failed),
+            Mark::HomeAndAway { home, away } => home.iter().chain(away).copied().collect(),
             Mark::Ratio { low, high, paper, .. } => {
                 [*low, *high].into_iter().chain(*paper).collect()
             }
@@ -419,6 +491,31 @@ mod tests {
         let speed = speed_ups(&groups, &["ha-rs"]).panels();
         assert!(speed[0].svg.contains("the reference"));
         assert!(nodes(&groups, &["ha-rs"], &rows).panels()[0].svg.contains("median 10,"));
+    }
+
+    #[test]
+    fn home_stands_against_away_where_a_run_has_both() {
+        let in_set = |set: &str, method: &str, time| Row {
+            set: set.to_owned(),
+            ..row(&format!("{set}-scene"), method, time, true)
+        };
+        let mut rows = vec![
+            in_set("home", "ha-rs", 0.02),
+            in_set("home", "n3p", 0.001),
+            in_set("lots", "ha-rs", 0.02),
+        ];
+        let methods = ["ha-rs", "n3p", "sha"];
+        assert_eq!(home_and_away(&methods, &rows[..2]).len(), 0, "only home");
+        assert_eq!(home_and_away(&["n3p"], &rows).len(), 0, "nothing to compare with");
+        let svg = &home_and_away(&methods, &rows)[0].svg;
+        assert!(svg.contains("n3p: at home 20.00 ×, away no scenes"), "{svg}");
+        rows.push(in_set("lots", "n3p", 0.01));
+        let panels = home_and_away(&methods, &rows);
+        assert_eq!(panels.len(), 1);
+        let svg = &panels[0].svg;
+        assert!(svg.contains("n3p: at home 20.00 ×, away 2.000 ×"), "{svg}");
+        assert!(svg.contains("sha: not applicable") && svg.contains("the reference"), "{svg}");
+        assert!(!svg.contains("NaN"));
     }
 
     #[test]
