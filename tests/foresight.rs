@@ -128,7 +128,7 @@ fn the_shipped_log_says_that_it_foresees_better_than_estimates() {
     for library in &log.libraries {
         let v = library.validation;
         assert!(v.in_first > 1.5 * v.in_first_by_estimate, "{library:?}");
-        assert!(v.in_order > 0.7 && v.cost_median < 0.1, "{library:?}");
+        assert!(v.in_order > 0.6 && v.cost_median < 0.1, "{library:?}");
     }
 }
 
