@@ -81,16 +81,26 @@ impl Dense {
     fn forward(&self, active: &[(usize, f32)], out: &mut [f32]) {
         let blocks = self.bias.iter().zip(self.weight.chunks_exact(self.inputs));
         for ((bias, rows), out) in blocks.zip(out.chunks_mut(BLOCK)) {
-            let mut sums = *bias;
-            for &(i, v) in active {
-                let row = &rows[i];
-                for (sum, w) in sums.iter_mut().zip(row) {
-                    *sum += v * w;
-                }
+            let sums = block(bias, rows, active);
+            match out.as_chunks_mut() {
+                ([whole], _) => *whole = sums,
+                (_, part) => part.copy_from_slice(&sums[..part.len()]),
             }
-            out.copy_from_slice(&sums[..out.len()]);
         }
     }
+}
+
+/// The outputs of one block. A function of its own, so that its sums stay in registers.
+#[inline(always)]
+fn block(bias: &[f32; BLOCK], rows: &[[f32; BLOCK]], active: &[(usize, f32)]) -> [f32; BLOCK] {
+    let mut sums = *bias;
+    for &(i, v) in active {
+        let row = &rows[i];
+        for (sum, w) in sums.iter_mut().zip(row) {
+            *sum += v * w;
+        }
+    }
+    sums
 }
 
 impl Network {

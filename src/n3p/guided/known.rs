@@ -54,7 +54,7 @@ pub(crate) struct Prepared {
     pub(crate) library: Library,
     /// From this number on its manoeuvres are none but the straight into the spot, or nothing at
     /// all: what joins them is the curve straight to the goal.
-    pub(super) straights: usize,
+    pub(crate) straights: usize,
     /// Manoeuvres that are rarely of use.
     pub(crate) rare: Library,
     /// What foresight knows of the library's manoeuvres, where there is foresight, and, once they are
@@ -89,6 +89,11 @@ impl Prepared {
         Some(prepared)
     }
 
+    /// Whether it was made ready for such problems.
+    fn serves(&self, problem: &Problem) -> bool {
+        problem.stance() == Some(self.stance) && self.library.fits(problem)
+    }
+
     /// What says what each manoeuvre of one of the libraries is.
     pub(crate) fn values(
         &self,
@@ -107,17 +112,6 @@ impl Prepared {
         let route = if is_straight { Route::Direct } else { Route::Library };
         let guidance = Guidance { preparatory, route };
         Known { path: plan.path, cost: plan.cost, guidance, least, foreseen: None }
-    }
-
-    /// The least estimates of manoeuvres and of the curve straight to the goal, of all `estimates`.
-    pub(crate) fn least(&self, estimates: &[f32]) -> [f64; 2] {
-        let (manoeuvres, straights) = estimates.split_at(self.straights);
-        [manoeuvres, straights].map(|of| of.iter().copied().fold(f32::INFINITY, f32::min).into())
-    }
-
-    /// Whether it was made ready for such problems.
-    fn serves(&self, problem: &Problem) -> bool {
-        problem.stance() == Some(self.stance) && self.library.fits(problem)
     }
 }
 

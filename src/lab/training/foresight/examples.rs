@@ -192,10 +192,15 @@ impl Pupil {
             best = leg.cost;
         }
         let (mut estimates, mut costs) = (Vec::new(), Vec::new());
+        let mut least = [any; 2];
         for library in [&prepared.library, &prepared.rare] {
             verdicts.clear();
             let mut look_up = search.look_up(library, verdicts, problem, model, any);
             let first = estimates.len();
+            if first == 0 {
+                // What `n3p` knows when it looks.
+                least = look_up.least_estimates(prepared.straights).into();
+            }
             estimates.extend_from_slice(look_up.estimates());
             let of_library = look_up.costs_within(TIMES).into_iter();
             costs.extend(of_library.map(|(i, cost)| (first + i, cost)));
@@ -203,7 +208,6 @@ impl Pupil {
         let known = costs.iter().map(|(_, cost)| *cost).fold(f64::INFINITY, f64::min);
         costs.retain(|(_, cost)| *cost < TIMES * known);
         best = best.min(known);
-        let least = prepared.least(&estimates[..prepared.library.len()]);
         let unit = vehicle.turning_radius();
         let least_of_all = least[0].min(least[1]) as f32;
         Some(Example {
