@@ -1,7 +1,7 @@
 //! Foresight: a network that sees the free space around a spot, and says what known manoeuvres are worth
 //! there and what the best plan will cost.
 //!
-//! Two towers. One makes a code of the scene: start, vehicle, how far everything is ([`free_space`]), and
+//! Two towers. One makes a code of the scene: start, vehicle, how far everything is (`free_space`), and
 //! the estimates of the library. The other makes a code of every manoeuvre: where it begins, what it costs,
 //! what it sweeps; those of a library are made once. How well they go together, less what the manoeuvre is
 //! estimated to cost, is its score. The scene's code also holds the foreseen cost of the best plan.

@@ -2,8 +2,8 @@
 //! costs ([`crate::selectors::foresight`]).
 //!
 //! World by world every manoeuvre of the library is tried, and a teacher, Hybrid A* that takes the best of
-//! several solutions and improves it, looks for something better ([`examples`]). The network learns which
-//! manoeuvres come near the best one, and what the best plan costs ([`fit`]). Whole libraries are
+//! several solutions and improves it, looks for something better (`examples`). The network learns which
+//! manoeuvres come near the best one, and what the best plan costs (`fit`). Whole libraries are
 //! validated with worlds of another seed.
 
 mod config;

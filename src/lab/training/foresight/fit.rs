@@ -299,5 +299,5 @@ fn holds(example: &Example, scores: &[f32], count: usize) -> f64 {
     order.sort_by(|a, b| scores[*b].total_cmp(&scores[*a]));
     let good =
         |i: &usize| example.costs.iter().any(|(m, cost)| *m as usize == *i && *cost <= NOTHING);
-    f64::from(u8::from(order.iter().take(count).any(|i| good(i))))
+    f64::from(u8::from(order.iter().take(count).any(good)))
 }
