@@ -84,8 +84,7 @@ fn write_card(folder: &Path) -> anyhow::Result<()> {
     let is_complete = |kind: &ParkingType| dataset::manifest::manifest_path(folder, *kind).exists();
     let kinds: Vec<ParkingType> = ParkingType::ALL.into_iter().filter(is_complete).collect();
     let set = Dataset::read_types(folder, &kinds)?;
-    let name = folder.file_name().unwrap_or_default().to_string_lossy();
-    let card = dataset::card::card(&name, &set, &set.content_sha256(&kinds));
+    let card = dataset::card::card(&set, &set.content_sha256(&kinds));
     files::write_whole(&folder.join("card.md"), card.as_bytes())?;
     Ok(())
 }

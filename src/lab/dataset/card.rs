@@ -1,6 +1,6 @@
 //! The card of a data set: what it is, where it comes from, what is in it and what is not, in Markdown.
 //!
-//! It says nothing of the day, the machine or the build, so that the same settings give the same bytes.
+//! It says nothing of the day, the machine, the build or the folder, so that the same settings give the same bytes.
 
 use std::fmt::Write;
 
@@ -10,8 +10,8 @@ use crate::world::cell::Axis;
 
 pub(in crate::lab) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// The card of a data set with this checksum, in a folder of this name.
-pub fn card(name: &str, set: &Dataset, sha256: &str) -> String {
+/// The card of a data set with this checksum.
+pub fn card(set: &Dataset, sha256: &str) -> String {
     let of = |kind: ParkingType| set.samples.iter().filter(move |s| s.cell.kind() == kind);
     let kinds: Vec<ParkingType> =
         ParkingType::ALL.into_iter().filter(|kind| of(*kind).next().is_some()).collect();
@@ -44,7 +44,7 @@ pub fn card(name: &str, set: &Dataset, sha256: &str) -> String {
     let kinds: Vec<&str> = kinds.iter().map(|kind| spots(*kind)).collect();
     format!(
         "\
-# Data card: `{name}`
+# Data card
 
 Reeds-Shepp start poses of solved parking problems in abstracted environments: for {kinds}.
 Written by n3p {VERSION}; the columns are in docs/formats.md.
