@@ -1,7 +1,7 @@
 //! What `n3p` foresees: which known manoeuvres to try first, and what a plan may cost.
 
 use super::GuidedPlanner;
-use super::known::{DEEPER, Known, least, rarely_used};
+use super::known::{DEEPER, Known, USUAL, least, rarely_used};
 use crate::planners::Problem;
 use crate::selectors::foresight::{Codes, Outlook};
 
@@ -71,6 +71,13 @@ impl GuidedPlanner {
         let order = ranking.order(codes, look_up.estimates());
         let first = look_up.promising(order, any, AT_ONCE * foreseen);
         let mut best = first.map(|plan| prepared.known(plan, least));
+        // Where that is far above what estimates say these have a say, too: elsewhere than where it has
+        // learnt the network errs.
+        if let Some(known) = best.as_ref().filter(|known| known.cost > USUAL * least)
+            && let Some(better) = look_up.cheapest(Some(known.cost), any, 0)
+        {
+            best = Some(prepared.known(better, least));
+        }
         let bound = best.as_ref().map_or(any, |known| known.cost);
         if bound > WILL_DO * foreseen {
             verdicts.clear();

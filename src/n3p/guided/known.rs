@@ -30,7 +30,7 @@ const TRIES: usize = 64;
 /// A plan that costs at most so many times the estimate of the best known one (which knows nothing
 /// of joints and obstacles) or the least cost through empty space is taken as it is, unless it
 /// passes something near on its way.
-const USUAL: f64 = 1.3;
+pub(super) const USUAL: f64 = 1.3;
 /// Further limits of the same kind, for plans with changes of gear: see [`dear`]. The last is also the
 /// limit by a spot that no usual cell stands for.
 const RATHER_DEAR: f64 = 1.6;
@@ -321,20 +321,20 @@ impl GuidedPlanner {
     }
 
     /// Whether a plan costs no more than usual: little more than the least through empty space, or about
-    /// what was foreseen; without foresight no more than [`dear`] allows over the library's estimate. With the
-    /// usual changes of gear that is much, since manoeuvres for them were learnt in many worlds. By an
+    /// what was foreseen, if anything was, and no more than [`dear`] allows over the library's estimate. With
+    /// the usual changes of gear that is much, since manoeuvres for them were learnt in many worlds; by an
     /// unusual spot it is at most twice the estimate.
     pub(super) fn is_usual(&mut self, known: &Known, standard: &mut Standard) -> bool {
         if known.cost <= standard.enough(&mut self.hars) {
             return true;
         }
         let times = known.cost / known.least.max(standard.least(&mut self.hars));
-        let is_like_others = match known.is_as_foreseen() {
-            Some(is_as_foreseen) => is_as_foreseen,
-            None if known.cost <= USUAL * known.least => return true,
-            None => times <= dear(standard.problem, known.path.direction_changes()),
-        };
-        is_like_others && (times <= DEAR_BY_UNUSUAL || !standard.is_unusual())
+        if known.is_as_foreseen() == Some(false) {
+            return false;
+        }
+        let limit = dear(standard.problem, known.path.direction_changes());
+        known.cost <= USUAL * known.least
+            || (times <= limit && (times <= DEAR_BY_UNUSUAL || !standard.is_unusual()))
     }
 
     /// What is known, or the rest of the manoeuvre that the car stands in where that costs less: who
