@@ -36,6 +36,8 @@ pub(super) const USUAL: f64 = 1.3;
 const RATHER_DEAR: f64 = 1.6;
 const DEAR: f64 = 3.0;
 pub(super) const DEAR_BY_UNUSUAL: f64 = 2.0;
+/// What costs about as much as foreseen may cost so many times these limits.
+const TRUSTED: f64 = 1.5;
 /// Changes of gear that a parallel spot takes at most as a rule, and a bay.
 const TO_AND_FRO: usize = 4;
 const INTO_A_BAY: usize = 2;
@@ -321,20 +323,22 @@ impl GuidedPlanner {
     }
 
     /// Whether a plan costs no more than usual: little more than the least through empty space, or about
-    /// what was foreseen, if anything was, and no more than [`dear`] allows over the library's estimate. With
-    /// the usual changes of gear that is much, since manoeuvres for them were learnt in many worlds; by an
+    /// what was foreseen, if anything was, and then half as much again as [`dear`] allows over the library's
+    /// estimate. With the usual changes of gear that is much, since manoeuvres for them were learnt in many worlds; by an
     /// unusual spot it is at most twice the estimate.
     pub(super) fn is_usual(&mut self, known: &Known, standard: &mut Standard) -> bool {
         if known.cost <= standard.enough(&mut self.hars) {
             return true;
         }
         let times = known.cost / known.least.max(standard.least(&mut self.hars));
-        if known.is_as_foreseen() == Some(false) {
-            return false;
-        }
-        let limit = dear(standard.problem, known.path.direction_changes());
-        known.cost <= USUAL * known.least
-            || (times <= limit && (times <= DEAR_BY_UNUSUAL || !standard.is_unusual()))
+        let trust = match known.is_as_foreseen() {
+            _ if known.cost <= USUAL * known.least => return true,
+            Some(false) => return false,
+            Some(true) => TRUSTED,
+            None => 1.0,
+        };
+        let limit = trust * dear(standard.problem, known.path.direction_changes());
+        times <= limit && (times <= DEAR_BY_UNUSUAL || !standard.is_unusual())
     }
 
     /// What is known, or the rest of the manoeuvre that the car stands in where that costs less: who
