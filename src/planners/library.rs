@@ -13,6 +13,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::sync::OnceLock;
 
+use crate::curves::reeds_shepp::Word;
 use crate::curves::{Path, Segment};
 use crate::geometry::{Aabb, Pose};
 use crate::vehicle::Vehicle;
@@ -292,20 +293,20 @@ impl LookUp<'_> {
     /// more than what is found before, if it costs less than `bound`; the first that costs little `enough`.
     pub fn promising(&mut self, order: &[u32], mut bound: f64, enough: f64) -> Option<LibraryPlan> {
         let mut best = None;
-        for &index in order {
-            let candidate = Candidate::new(self.search.estimates[index as usize], index as usize);
+        for index in order.iter().map(|index| *index as usize) {
+            let candidate = Candidate::new(self.search.estimates[index], index);
             if candidate.estimate() < bound
-                && self.verdicts.is_free(self.library, index as usize, self.problem, self.end)
-                && let Some(plan) = self.join(candidate, bound)
+                && self.verdicts.is_free(self.library, index, self.problem, self.end)
+                && let Some((word, cost)) = self.joint(candidate, bound)
             {
-                bound = plan.cost;
-                best = Some(plan);
+                bound = cost;
+                best = Some((candidate, word));
                 if bound <= enough {
                     break;
                 }
             }
         }
-        best
+        best.map(|(candidate, word)| self.plan(candidate, word, bound))
     }
 
     /// What plans by the manoeuvres cost that are free and joined by a free curve, and no more than so many
@@ -317,10 +318,10 @@ impl LookUp<'_> {
                 break;
             }
             if self.verdicts.is_free(self.library, candidate.index(), self.problem, self.end)
-                && let Some(plan) = self.join(candidate, bound)
+                && let Some((_, cost)) = self.joint(candidate, bound)
             {
-                bound = bound.min(times * plan.cost);
-                costs.push((plan.manoeuvre, plan.cost));
+                bound = bound.min(times * cost);
+                costs.push((candidate.index(), cost));
             }
         }
         costs.retain(|(_, cost)| *cost < bound);
@@ -401,9 +402,15 @@ impl LookUp<'_> {
 
     /// The plan through a free manoeuvre, if a free curve joins it within `bound`.
     fn join(&mut self, candidate: Candidate, bound: f64) -> Option<LibraryPlan> {
+        let (word, cost) = self.joint(candidate, bound)?;
+        Some(self.plan(candidate, word, cost))
+    }
+
+    /// The free curve that joins a free manoeuvre at the least cost, and what it costs with the manoeuvre, if that
+    /// is less than `bound`.
+    fn joint(&mut self, candidate: Candidate, bound: f64) -> Option<(Word, f64)> {
         let Self { library, problem, end, model, .. } = *self;
-        let manoeuvre = candidate.index();
-        let entry = &library.manoeuvres[manoeuvre].entry;
+        let entry = &library.manoeuvres[candidate.index()].entry;
         let preparatory = end.compose(entry.pose);
         let (departure, bound) = (entry.departure(), bound - entry.cost());
         let (word, cost) = self.search.analytic.curve(
@@ -414,9 +421,16 @@ impl LookUp<'_> {
             problem,
             model,
         )?;
+        Some((word, cost + entry.cost()))
+    }
+
+    /// The plan by a curve and the manoeuvre that it joins.
+    fn plan(&self, candidate: Candidate, word: Word, cost: f64) -> LibraryPlan {
+        let manoeuvre = candidate.index();
+        let entry = &self.library.manoeuvres[manoeuvre].entry;
         let segments = word.segments().iter().chain(&entry.rest).copied();
-        let path = Path::new(problem.start, segments);
-        Some(LibraryPlan { path, cost: cost + entry.cost(), manoeuvre, preparatory })
+        let path = Path::new(self.problem.start, segments);
+        LibraryPlan { path, cost, manoeuvre, preparatory: self.end.compose(entry.pose) }
     }
 }
 
@@ -495,7 +509,10 @@ mod tests {
                 for (m, manoeuvre) in library.manoeuvres.iter().enumerate() {
                     let is_within =
                         manoeuvre.poses(vehicle.scale()).any(|(.., at)| is_beside(at, pose));
-                    assert!(!is_within || near.iter().any(|(i, _)| *i == m), "{kind} {m} {pose:?}");
+                    assert!(
+                        !is_within || near.iter().any(|(i, ..)| *i as usize == m),
+                        "{kind} {m} {pose:?}"
+                    );
                     found += usize::from(is_within);
                 }
             }

@@ -105,11 +105,11 @@ impl Passages {
         Self { passages, boxes }
     }
 
-    /// The manoeuvres that pass near a pose, in ascending order, each with where it passes nearest.
-    pub(super) fn near(&self, pose: Pose, vehicle: &Vehicle) -> Vec<(usize, Place)> {
+    /// The manoeuvres that pass near a pose, in ascending order, each with how near it passes, and where.
+    pub(super) fn near(&self, pose: Pose, vehicle: &Vehicle) -> Vec<(u32, f64, Place)> {
         let (nearest, radius) = (BESIDE * vehicle.scale(), vehicle.turning_radius());
         let [x, y, turn] = self.boxes.of(pose);
-        let mut near: Vec<(u32, f64, Place)> = Vec::new();
+        let mut near = Vec::new();
         for beside in 0..27 {
             let (dx, dy, dt) = (beside / 9 - 1, beside / 3 % 3 - 1, beside % 3 - 1);
             let number = self.boxes.number([x + dx, y + dy, turn + dt]);
@@ -123,7 +123,7 @@ impl Passages {
         }
         near.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         near.dedup_by_key(|(manoeuvre, ..)| *manoeuvre);
-        near.into_iter().map(|(manoeuvre, _, place)| (manoeuvre as usize, place)).collect()
+        near
     }
 }
 
@@ -166,7 +166,7 @@ impl Library {
         let passages = self.passages.get_or_init(|| Passages::new(&self.manoeuvres, &self.vehicle));
         let start = problem.goal.relative(problem.start);
         let near = passages.near(start, &self.vehicle).into_iter();
-        let near = near.map(|(i, place)| self.manoeuvres[i].rest(place, start));
+        let near = near.map(|(i, _, place)| self.manoeuvres[i as usize].rest(place, start));
         let cost = |path: &Path| model.path(&self.vehicle, &path.segments);
         let near = near.map(|path| (cost(&path), path));
         let mut near: Vec<(f64, Path)> = near.filter(|(cost, _)| *cost < bound).collect();
