@@ -271,16 +271,13 @@ impl GuidedPlanner {
         let mut is_usual = self.is_usual(&known, &mut standard);
         let apart = problem.start.distance(problem.goal) / problem.vehicle.length;
         let may_go_on = problem.starts_at_the_spot() || (apart < NEAR_GOAL && !is_usual);
-        if !is_usual && !may_go_on {
+        if !is_usual || (may_go_on && known.cost > standard.enough(&mut self.hars)) {
             let (path, guidance) = self.or_direct(problem, (known.path, known.guidance));
             let cost = self.path_cost(problem, &path);
             known = Known { path, cost, guidance, ..known };
-            is_usual = self.is_usual(&known, &mut standard);
-        }
-        if may_go_on && known.cost > standard.enough(&mut self.hars) {
-            let (path, guidance) = self.or_direct(problem, (known.path, known.guidance));
-            let cost = self.path_cost(problem, &path);
-            known = self.or_rest(problem, Known { path, cost, guidance, ..known });
+            if may_go_on {
+                known = self.or_rest(problem, known);
+            }
             is_usual = self.is_usual(&known, &mut standard);
         }
         if is_usual && !self.hars.passes_near(problem, &known.path) {

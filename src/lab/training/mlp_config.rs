@@ -82,6 +82,21 @@ pub struct MlpConfig {
     pub seed: u64,
 }
 
+impl Schedule {
+    /// The share of the full rate when so much of the training is done, 0 to 1.
+    pub(in crate::lab::training) fn share(self, done: f64) -> f64 {
+        const LEAST: f64 = 0.01;
+        match self {
+            Schedule::Cosine => {
+                LEAST + (1.0 - LEAST) * (1.0 + (std::f64::consts::PI * done).cos()) / 2.0
+            }
+            Schedule::Step if done < 0.5 => 1.0,
+            Schedule::Step if done < 0.75 => 0.1,
+            Schedule::Step => 0.01,
+        }
+    }
+}
+
 impl Default for MlpConfig {
     fn default() -> Self {
         Self {
@@ -123,17 +138,7 @@ impl MlpConfig {
 
     /// The learning rate of an epoch, counted from 0.
     pub fn rate(&self, epoch: usize) -> f64 {
-        const LEAST: f64 = 0.01;
-        let done = epoch as f64 / self.epochs as f64;
-        let share = match self.schedule {
-            Schedule::Cosine => {
-                LEAST + (1.0 - LEAST) * (1.0 + (std::f64::consts::PI * done).cos()) / 2.0
-            }
-            Schedule::Step if done < 0.5 => 1.0,
-            Schedule::Step if done < 0.75 => 0.1,
-            Schedule::Step => 0.01,
-        };
-        self.learning_rate * share
+        self.learning_rate * self.schedule.share(epoch as f64 / self.epochs as f64)
     }
 }
 

@@ -2,7 +2,8 @@
 //!
 //! [`knn`] stores samples and a [`library`] of their manoeuvres and of those of many [`worlds`]; [`mlp`] trains a network
 //! (`targets` says what it is to learn, `regression` fits it). Both take samples and metadata of
-//! one data set; [`fleet`] does both for the data sets of several vehicles. All write an artefact
+//! one data set; [`fleet`] does both for the data sets of several vehicles.
+//! [`foresight`] learns in generated scenes what manoeuvres are worth; [`onnx`] writes networks for other runtimes. All write an artefact
 //! that [`crate::selectors`] loads. Beside it they leave what programs
 //! and people want to know of it: a log ([`log_path`]), with its [`quality`], and a model card
 //! ([`card_path`]). While they train they tell what they do, line by line ([`watch`]).

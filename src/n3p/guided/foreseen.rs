@@ -13,6 +13,7 @@ const AT_ONCE: f64 = 0.95;
 /// is searched for once more. Both chosen in the world "wide", seed 92.
 const WILL_DO: f64 = 1.2;
 pub(super) const FAR_FROM_FORESEEN: f64 = 1.4;
+
 impl Known {
     /// Whether it costs about what the best plan was foreseen to cost, or less; `None` without foresight.
     pub(super) fn is_as_foreseen(&self) -> Option<bool> {

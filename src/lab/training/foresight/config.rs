@@ -4,8 +4,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::lab::training::TrainingError;
 use crate::lab::training::settings::{self, real, whole};
+use crate::lab::training::{Schedule, TrainingError};
 use crate::toml_file::Setting;
 
 /// Settings of the training. Every one may be left out of a file.
@@ -77,9 +77,6 @@ impl ForesightConfig {
 
     /// The learning rate of an epoch, counted from 0.
     pub(super) fn rate(&self, epoch: usize) -> f64 {
-        const LEAST: f64 = 0.01;
-        let done = epoch as f64 / self.epochs as f64;
-        let share = LEAST + (1.0 - LEAST) * (1.0 + (std::f64::consts::PI * done).cos()) / 2.0;
-        self.learning_rate * share
+        self.learning_rate * Schedule::Cosine.share(epoch as f64 / self.epochs as f64)
     }
 }
