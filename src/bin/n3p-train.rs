@@ -68,6 +68,20 @@ struct Common {
     data: PathBuf,
 }
 
+/// Settings of a training.
+#[derive(Args)]
+struct Settings {
+    /// Settings of the training, a TOML file; the defaults when omitted
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// A setting instead of the file's, such as epochs=5 or sac.discount=0.99; may be given several times
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<Setting>,
+    /// Seed of all that is drawn, such as weights, order and worlds; overrides the settings
+    #[arg(long, value_name = "S")]
+    seed: Option<u64>,
+}
+
 #[derive(Args)]
 struct MlpArgs {
     #[command(flatten)]
@@ -75,15 +89,8 @@ struct MlpArgs {
     /// Model file [default: models/mlp-TYPE.safetensors]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Settings of the training, a TOML file; the defaults when omitted
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
-    /// A setting instead of the file's, such as epochs=5; may be given several times
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<Setting>,
-    /// Seed of weights, shuffling and validation cells; overrides the settings
-    #[arg(long, value_name = "S")]
-    seed: Option<u64>,
+    #[command(flatten)]
+    settings: Settings,
 }
 
 #[derive(Args)]
@@ -113,15 +120,8 @@ struct FleetArgs {
     /// Model file
     #[arg(long, value_name = "FILE", default_value = "models/fleet.safetensors")]
     out: PathBuf,
-    /// Settings of the networks' training, a TOML file; the defaults when omitted
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
-    /// A setting instead of the file's, such as epochs=5; may be given several times
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<Setting>,
-    /// Seed of worlds, weights, shuffling and validation rows; overrides the settings
-    #[arg(long, value_name = "S")]
-    seed: Option<u64>,
+    #[command(flatten)]
+    settings: Settings,
     /// Generated worlds of each type in which manoeuvres are learnt, too; 0 for none
     #[arg(long, value_name = "N", default_value_t = WorldsConfig::default().count)]
     worlds: u32,
@@ -136,15 +136,8 @@ struct ForesightArgs {
     /// Model file
     #[arg(long, value_name = "FILE", default_value = "models/foresight.safetensors")]
     out: PathBuf,
-    /// Settings of the training, a TOML file; the defaults when omitted
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
-    /// A setting instead of the file's, such as epochs=5; may be given several times
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<Setting>,
-    /// Seed of worlds, weights and shuffling; overrides the settings
-    #[arg(long, value_name = "S")]
-    seed: Option<u64>,
+    #[command(flatten)]
+    settings: Settings,
 }
 
 #[derive(Args)]
@@ -166,18 +159,11 @@ struct RlArgs {
     /// Episodes; overrides the settings
     #[arg(long, value_name = "N")]
     episodes: Option<usize>,
-    /// Seed of problems, weights and noise; overrides the settings
-    #[arg(long, value_name = "S")]
-    seed: Option<u64>,
     /// Policy file [default: models/rl-ENV.safetensors]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Settings of the training, a TOML file; the defaults when omitted
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
-    /// A setting instead of the file's, such as sac.discount=0.99; may be given several times
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<Setting>,
+    #[command(flatten)]
+    settings: Settings,
     /// Go on from the checkpoint beside the policy file, if there is one
     #[arg(long)]
     resume: bool,
@@ -198,7 +184,7 @@ fn main() -> ExitCode {
 }
 
 fn mlp(args: &MlpArgs) -> anyhow::Result<ExitCode> {
-    let config = mlp_config(args.config.as_deref(), &args.set, args.seed)?;
+    let config = mlp_config(&args.settings)?;
     if args.out.is_some() && args.common.kind.is_none() {
         let text = "--out names one file, but every type gets its own: give --type, too";
         return Err(BadInput(text.to_owned()).into());
@@ -243,12 +229,8 @@ fn quality(rows: usize, errors: &Errors, reach: &Reach) -> String {
 }
 
 /// The settings of a file, or the usual ones, with another seed if asked for.
-fn mlp_config(
-    file: Option<&Path>,
-    set: &[Setting],
-    seed: Option<u64>,
-) -> anyhow::Result<MlpConfig> {
-    let mut config = MlpConfig::read(file, set).or_bad_input()?;
+fn mlp_config(Settings { config, set, seed }: &Settings) -> anyhow::Result<MlpConfig> {
+    let mut config = MlpConfig::read(config.as_deref(), set).or_bad_input()?;
     config.seed = seed.unwrap_or(config.seed);
     config.validate().or_bad_input()?;
     Ok(config)
@@ -275,7 +257,7 @@ fn knn(args: &KnnArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn fleet(args: &FleetArgs) -> anyhow::Result<ExitCode> {
-    let config = mlp_config(args.config.as_deref(), &args.set, args.seed)?;
+    let config = mlp_config(&args.settings)?;
     let worlds = WorldsConfig { count: args.worlds, seed: config.seed };
     worlds.validate().or_bad_input()?;
     artefact::check_writable(&args.out).or_bad_input()?;
@@ -325,8 +307,9 @@ fn fleet(args: &FleetArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn foresight(args: &ForesightArgs) -> anyhow::Result<ExitCode> {
-    let mut config = ForesightConfig::read(args.config.as_deref(), &args.set).or_bad_input()?;
-    config.seed = args.seed.unwrap_or(config.seed);
+    let Settings { config, set, seed } = &args.settings;
+    let mut config = ForesightConfig::read(config.as_deref(), set).or_bad_input()?;
+    config.seed = seed.unwrap_or(config.seed);
     config.validate().or_bad_input()?;
     artefact::check_writable(&args.out).or_bad_input()?;
     let models = training::foresight::load(&args.model).or_bad_input()?;
@@ -366,9 +349,10 @@ fn onnx(args: &OnnxArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn rl(args: &RlArgs) -> anyhow::Result<ExitCode> {
-    let mut config = RlConfig::read(args.config.as_deref(), &args.set).or_bad_input()?;
+    let Settings { config, set, seed } = &args.settings;
+    let mut config = RlConfig::read(config.as_deref(), set).or_bad_input()?;
     config.episodes = args.episodes.unwrap_or(config.episodes);
-    config.seed = args.seed.unwrap_or(config.seed);
+    config.seed = seed.unwrap_or(config.seed);
     config.validate().or_bad_input()?;
     let default = || PathBuf::from(format!("models/rl-{}.safetensors", args.course.name()));
     let out = args.out.clone().unwrap_or_else(default);
