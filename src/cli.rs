@@ -12,9 +12,11 @@ use std::sync::Arc;
 use clap::error::ErrorKind;
 use tracing_subscriber::filter::LevelFilter;
 
+use crate::curves::smoothing::StandstillSteering;
 use crate::files::reason;
 use crate::n3p::{Driver, more};
 use crate::planners::Problem;
+use crate::planners::goals::Terms;
 
 /// Exit code of a planner that found no path.
 pub const EXIT_NO_PATH: u8 = 3;
@@ -107,6 +109,31 @@ pub fn run(body: impl FnOnce() -> anyhow::Result<ExitCode>) -> ExitCode {
             eprintln!("error: {error:#}");
             ExitCode::from(if error.downcast_ref::<BadInput>().is_some() { 2 } else { 1 })
         }
+    }
+}
+
+/// What plans keep to.
+#[derive(clap::Args)]
+pub struct TermsArgs {
+    /// Keep so many metres from obstacles, 0 to 1; less along the whole path where start or goal
+    /// is nearer to one. Never less than 5 mm where they allow it.
+    #[arg(long, default_value_t = 0.0, value_name = "METRES", value_parser = margin, allow_hyphen_values = true)]
+    pub margin: f64,
+    /// Allow start and goal to reach so many metres into an obstacle, 0 to 0.2, as localisation
+    /// errs: such contact is only left, or only entered at the goal, and never deepened.
+    #[arg(long, default_value_t = 0.0, value_name = "METRES", value_parser = contact, allow_hyphen_values = true)]
+    pub allow_contact: f64,
+    /// Where the steering wheel may be turned while the car stands: "never", "at-changes" of gear, or
+    /// "anywhere", for paths of arcs. Elsewhere the wheels turn no faster than the vehicle allows.
+    #[arg(long, value_name = "never|at-changes|anywhere")]
+    pub standstill_steering: Option<StandstillSteering>,
+}
+
+impl TermsArgs {
+    /// The terms; arcs, where nothing else is asked for.
+    pub fn terms(&self) -> Terms {
+        let standstill = self.standstill_steering.unwrap_or_default();
+        Terms { margin: self.margin, contact: self.allow_contact, standstill }
     }
 }
 

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::Parser;
-use n3p::cli::{self, BadInput, OrBadInput, PolicyArgs};
+use n3p::cli::{self, BadInput, OrBadInput, PolicyArgs, TermsArgs};
 use n3p::episode::Case;
 use n3p::lab::evaluation::report::{self, Provenance};
 use n3p::lab::evaluation::suite::{self, Drawn, SuiteConfig, SuiteError, World};
@@ -14,7 +14,6 @@ use n3p::lab::evaluation::{Outputs, metrics, quality};
 use n3p::lab::progress;
 use n3p::lab::training;
 use n3p::n3p::{Method, MethodSettings, Models};
-use n3p::planners::goals::Terms;
 use n3p::planners::{Budget, Effort};
 use n3p::vehicle::Vehicle;
 use n3p::world::generate::GeneratorConfig;
@@ -67,14 +66,8 @@ struct Args {
     /// Print rows and summaries as JSON instead of tables.
     #[arg(long)]
     json: bool,
-    /// Keep so many metres from obstacles, 0 to 1; less along a whole path where start or goal
-    /// is nearer to one. Never less than 5 mm where they allow it.
-    #[arg(long, default_value_t = 0.0, value_name = "METRES", value_parser = cli::margin, allow_hyphen_values = true)]
-    margin: f64,
-    /// Allow starts and goals to reach so many metres into an obstacle, 0 to 0.2, where localisation
-    /// errs: such contact is only left, or only entered at the goal, and never deepened.
-    #[arg(long, default_value_t = 0.0, value_name = "METRES", value_parser = cli::contact, allow_hyphen_values = true)]
-    allow_contact: f64,
+    #[command(flatten)]
+    terms: TermsArgs,
     /// Expansion budget per scene and method.
     #[arg(long, default_value_t = 200_000, value_name = "N")]
     max_expansions: usize,
@@ -113,8 +106,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
         },
         settings: MethodSettings::default(),
         budget: Budget { max_expansions: args.max_expansions, effort: args.effort },
-        margin_m: args.margin,
-        allow_contact_m: args.allow_contact,
+        terms: args.terms.terms(),
         threads: args.threads.into(),
     };
     if args.policy.is_given() && !config.methods.contains(&Method::POLICY) {
@@ -130,7 +122,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
     let bar = progress::bar((cases.len() * config.methods.len()) as u64, "evaluate");
     let mut narrow = BTreeSet::new();
     let rows = suite::run(&cases, &models, &config, 0, |case, episode| {
-        if episode.problem.margin < args.margin {
+        if episode.problem.margin < args.terms.margin {
             narrow.insert(case.scene.name.clone());
         }
         bar.set_message(format!("{} {}", episode.row.method, episode.row.scene));
@@ -149,7 +141,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
              paths there may come as near",
             narrow.len(),
             cases.len(),
-            args.margin
+            args.terms.margin
         );
     }
 
@@ -180,7 +172,7 @@ struct Chosen {
 
 fn choose(args: &Args, vehicle: &Vehicle, methods: &[Method], models: &Models) -> Result<Chosen> {
     if let Some(dir) = &args.scenes {
-        let terms = Terms { margin: args.margin, contact: args.allow_contact };
+        let terms = args.terms.terms();
         let folder = suite::from_folder(dir, args.kind, terms).or_bad_input()?;
         folder.unusable.iter().for_each(|line| tracing::warn!("left out: {line}"));
         let complaint = folder.complaint();

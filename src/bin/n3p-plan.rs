@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::Parser;
-use n3p::cli::{self, BadInput, OrBadInput, PolicyArgs};
+use n3p::cli::{self, BadInput, OrBadInput, PolicyArgs, TermsArgs};
 use n3p::curves::TrajectoryLimits;
 use n3p::curves::trajectory::TrajectoryReport;
 use n3p::episode;
@@ -17,7 +17,7 @@ use n3p::files::{check_writable, reason, write_whole};
 use n3p::geometry::{Pose, signed_angle};
 use n3p::n3p::{Method, MethodSettings, Models, catalogue};
 use n3p::output::TrajectoryFile;
-use n3p::planners::goals::{self, PassedOver, Terms};
+use n3p::planners::goals::{self, PassedOver};
 use n3p::planners::{Budget, Effort, Problem, ProblemError};
 use n3p::world::Scene;
 
@@ -42,14 +42,8 @@ struct Args {
     models: Vec<String>,
     #[command(flatten)]
     policy: PolicyArgs,
-    /// Keep so many metres from obstacles, 0 to 1; less along the whole path where start or goal
-    /// is nearer to one. Never less than 5 mm where they allow it.
-    #[arg(long, default_value_t = 0.0, value_name = "METRES", value_parser = cli::margin, allow_hyphen_values = true)]
-    margin: f64,
-    /// Allow start and goal to reach so many metres into an obstacle, 0 to 0.2, as localisation
-    /// errs: such contact is only left, or only entered at the goal, and never deepened.
-    #[arg(long, default_value_t = 0.0, value_name = "METRES", value_parser = cli::contact, allow_hyphen_values = true)]
-    allow_contact: f64,
+    #[command(flatten)]
+    terms: TermsArgs,
     /// Write the path to this JSON file.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -135,10 +129,10 @@ fn plan(args: &Args) -> Result<ExitCode> {
     let file = args.scene.as_deref().expect("clap asks for it");
     let scene = Scene::read(file).or_bad_input()?;
     let file = file.display();
-    let terms = Terms { margin: args.margin, contact: args.allow_contact };
+    let terms = args.terms.terms();
     let problem = goals::first_problem(&scene, terms).map_err(|e| {
-        let than = format!(" (--allow-contact {} m is not enough)", args.allow_contact);
-        let more = if args.allow_contact > 0.0 { &than } else { "" };
+        let than = format!(" (--allow-contact {} m is not enough)", args.terms.allow_contact);
+        let more = if args.terms.allow_contact > 0.0 { &than } else { "" };
         BadInput(format!("{file}: {e}{more}; move it to where the car fits"))
     })?;
     let unwritable = |path: &Path, e: io::Error| {
@@ -155,20 +149,15 @@ fn plan(args: &Args) -> Result<ExitCode> {
     // One run, as it comes: the time includes what a first call costs.
     let budget = Budget { max_expansions: args.max_expansions, effort: args.effort };
     let usual = EpisodeConfig::new(budget);
-    let once = EpisodeConfig {
-        repeats: 0,
-        margin_m: args.margin,
-        allow_contact_m: args.allow_contact,
-        ..usual
-    };
+    let once = EpisodeConfig { repeats: 0, terms, ..usual };
     let episode = episode::run(&case, planner.as_mut(), &once, &JUDGE)?;
     tell(&case.scene, &episode);
     let kept = &episode.problem;
-    if kept.margin < args.margin && kept.contact.is_none() {
+    if kept.margin < args.terms.margin && kept.contact.is_none() {
         tracing::warn!(
             "start or goal is nearer to an obstacle than --margin {}: the path may come as near as \
              {} m to that obstacle",
-            args.margin,
+            args.terms.margin,
             kept.margin
         );
     }

@@ -36,11 +36,8 @@ pub struct Case {
 pub struct EpisodeConfig {
     /// How much work a plan may take.
     pub budget: Budget,
-    /// Clearance that plans keep where start and goal allow it, metres, 0 to 1: see
-    /// [`Problem::with_margin`].
-    pub margin_m: f64,
-    /// How deep start and goal may reach into obstacles, metres: see [`Problem::allowing_contact`].
-    pub allow_contact_m: f64,
+    /// What plans keep to.
+    pub terms: Terms,
     /// At most so many timed runs after the first.
     pub repeats: usize,
     /// No further run begins once the runs so far took this long together, seconds.
@@ -48,15 +45,9 @@ pub struct EpisodeConfig {
 }
 
 impl EpisodeConfig {
-    /// The usual timing and margin with `budget`.
+    /// The usual timing and terms with `budget`.
     pub fn new(budget: Budget) -> Self {
-        let Terms { margin: margin_m, contact: allow_contact_m } = Terms::default();
-        Self { budget, margin_m, allow_contact_m, repeats: 5, repeat_within_s: 0.05 }
-    }
-
-    /// What plans keep to.
-    pub fn terms(&self) -> Terms {
-        Terms { margin: self.margin_m, contact: self.allow_contact_m }
+        Self { budget, terms: Terms::default(), repeats: 5, repeat_within_s: 0.05 }
     }
 }
 
@@ -137,7 +128,7 @@ fn timed(
     config: &EpisodeConfig,
 ) -> Result<(Planned, f64), ProblemError> {
     let start = Instant::now();
-    let planned = goals::plan(planner, scene, config.terms(), config.budget)?;
+    let planned = goals::plan(planner, scene, config.terms, config.budget)?;
     Ok((planned, start.elapsed().as_secs_f64()))
 }
 
@@ -196,7 +187,7 @@ fn describe(
     let scene = case.scene.with_goal(case.scene.all_goals()[goal_index]);
     let file = PathFile::new(&scene, &problem.frame, path, &row.method);
     let share = result.covered.map(|_| PARKED_COVER);
-    match (judge.check)(&scene, &file, share, config.allow_contact_m) {
+    match (judge.check)(&scene, &file, share, config.terms.contact) {
         Ok(clearance) => {
             row.ok = true;
             row.min_clearance_m = Some(clearance.least).filter(|c| c.is_finite());

@@ -140,7 +140,7 @@ impl Contact {
     /// The ordinary problem from `start` to `goal`, which touch nothing.
     fn between(&self, problem: &Problem, start: Pose, goal: Pose) -> Option<Problem> {
         let Problem { vehicle, frame, kind, ref obstacles, .. } = *problem;
-        let terms = Terms { margin: self.margin, contact: 0.0 };
+        let terms = Terms { margin: self.margin, ..Terms::default() };
         let (ends, obstacles) = ([start, goal], obstacles.clone());
         let part = Problem::checked(vehicle, frame, kind, ends, obstacles, self.bounds, terms);
         // The lane begins where it did; the goal may lie farther out.

@@ -6,6 +6,7 @@
 //! The order of the goals does not matter, but among equals the first is taken.
 
 use super::contact;
+use super::continuous;
 use super::cost::CostModel;
 pub use super::problem::Terms;
 use super::{Budget, NoPath, PlanResult, Planner, Problem, ProblemError};
@@ -81,7 +82,7 @@ impl<'a> Goal<'a> {
     /// The problem with exactly this goal, or why the car does not fit there. Other errors are the
     /// scene's.
     fn exact(&self) -> Result<Result<Problem, ProblemError>, ProblemError> {
-        let Terms { margin, contact } = self.terms;
+        let Terms { margin, contact, .. } = self.terms;
         let single;
         // Most scenes have one goal and are not copied.
         let scene = if self.scene.goals.is_empty() {
@@ -158,6 +159,7 @@ impl<'a> Goal<'a> {
     ) -> Result<Result<Found, ProblemError>, ProblemError> {
         let found = |problem: Problem, result: PlanResult| {
             let result = ended_early(&problem, result);
+            let result = continuous::driven(&problem, result, self.terms.standstill, budget);
             let path = result.outcome.as_ref();
             let cost = |path: &Path| self.model.path(&problem.vehicle, &path.segments);
             let cost = path.map_or(f64::INFINITY, cost);

@@ -14,6 +14,7 @@ mod approach;
 mod budget;
 mod config;
 mod contact;
+mod continuous;
 pub mod cost;
 mod cost_to_go;
 mod exit_manoeuvre;
@@ -42,7 +43,7 @@ pub use plain::PlainHybridAStar;
 pub use problem::{Conflict, Problem, ProblemError};
 pub use scenario::ScenarioHybridAStar;
 
-use crate::curves::Path;
+use crate::curves::{Path, SmoothPath};
 use crate::geometry::Pose;
 
 /// Anything that plans a path. Implementations keep buffers between calls; results
@@ -60,6 +61,9 @@ pub trait Planner {
 pub struct PlanResult {
     /// The path in the problem's frame, from the start to the goal.
     pub outcome: Result<Path, NoPath>,
+    /// The same path with clothoids, where steering that is continuous was asked for: `outcome` then holds
+    /// arcs that it is nowhere farther from than half of the margin.
+    pub smooth: Option<SmoothPath>,
     /// Share of the parked footprint that the car covers at the path's end, where the path does
     /// not lead exactly to the goal; `None` where it does.
     pub covered: Option<f64>,
@@ -74,7 +78,7 @@ impl PlanResult {
     /// its tolerance lets it end) and keep the steering limit: the certificate every planner's path leaves with.
     pub fn certified(problem: &Problem, path: Path, expansions: usize) -> Self {
         if problem.is_arrival(path.end()) && is_drivable(problem, &path) {
-            Self { outcome: Ok(path), covered: None, expansions, guidance: None }
+            Self::with(Ok(path), expansions)
         } else {
             Self::none(NoPath::Uncertified, expansions)
         }
@@ -85,7 +89,7 @@ impl PlanResult {
     pub fn certified_cover(problem: &Problem, path: Path, expansions: usize) -> Self {
         let covered = problem.vehicle.overlap(path.end(), problem.goal);
         if covered >= PARKED_COVER && is_drivable(problem, &path) {
-            Self { outcome: Ok(path), covered: Some(covered), expansions, guidance: None }
+            Self { covered: Some(covered), ..Self::with(Ok(path), expansions) }
         } else {
             Self::none(NoPath::Uncertified, expansions)
         }
@@ -93,7 +97,11 @@ impl PlanResult {
 
     /// A result without path.
     pub fn none(reason: NoPath, expansions: usize) -> Self {
-        Self { outcome: Err(reason), covered: None, expansions, guidance: None }
+        Self::with(Err(reason), expansions)
+    }
+
+    fn with(outcome: Result<Path, NoPath>, expansions: usize) -> Self {
+        Self { outcome, smooth: None, covered: None, expansions, guidance: None }
     }
 }
 
@@ -133,6 +141,9 @@ pub enum NoPath {
     /// The method does not apply to this problem.
     #[error("not applicable")]
     NotApplicable,
+    /// There is a path, but none was found on which the steering angle is continuous.
+    #[error("no path without steering at standstill was found; there is one with it")]
+    NotSmooth,
     /// The path found did not pass the final swept check (our bug; reported, not hidden).
     #[error("path rejected by the final check")]
     Uncertified,

@@ -1,6 +1,7 @@
 //! A problem: a scene in planning coordinates, indexed and checked.
 
 use super::contact::{Contact, depth_into};
+use crate::curves::smoothing::StandstillSteering;
 use crate::geometry::{Aabb, Frame, Pose, Vec2};
 use crate::vehicle::{Gear, Vehicle};
 use crate::world::cell::{Cell, Grid};
@@ -46,6 +47,8 @@ pub struct Terms {
     pub margin: f64,
     /// How deep start and goal may reach into obstacles, metres: see [`Problem::allowing_contact`].
     pub contact: f64,
+    /// Where the steering wheel may be turned while the car stands.
+    pub standstill: StandstillSteering,
 }
 
 impl Terms {
@@ -62,9 +65,10 @@ impl Terms {
 }
 
 impl Default for Terms {
-    /// The usual margin and no contact.
+    /// The usual margin, no contact, and arcs.
     fn default() -> Self {
-        Self { margin: Problem::MARGIN, contact: 0.0 }
+        let standstill = StandstillSteering::Anywhere;
+        Self { margin: Problem::MARGIN, contact: 0.0, standstill }
     }
 }
 
@@ -239,7 +243,8 @@ impl Problem {
         margin: f64,
         contact: f64,
     ) -> Result<Problem, ProblemError> {
-        Self::unexplained(scene, Terms { margin, contact }).map_err(|error| error.explained(scene))
+        let terms = Terms { margin, contact, ..Terms::default() };
+        Self::unexplained(scene, terms).map_err(|error| error.explained(scene))
     }
 
     /// [`Problem::allowing_contact`] whose errors do not say what start or goal touch: finding that

@@ -54,6 +54,18 @@ pub struct Vehicle {
     /// Speed when driving backward, m/s.
     #[serde(default = "default_backward_speed")]
     pub backward_speed: f64,
+    /// How fast the front wheels turn, rad/s. The default is about 500°/s at the steering wheel of a usual
+    /// car. Left out of files where it is as usual, so that those of before keep their bytes.
+    #[serde(default = "default_steer_rate", skip_serializing_if = "is_default_steer_rate")]
+    pub steer_rate: f64,
+}
+
+fn default_steer_rate() -> f64 {
+    0.6
+}
+
+fn is_default_steer_rate(rate: &f64) -> bool {
+    *rate == default_steer_rate()
 }
 
 fn default_forward_speed() -> f64 {
@@ -74,6 +86,7 @@ impl Default for Vehicle {
             max_steer: 34.9_f64.to_radians(),
             forward_speed: default_forward_speed(),
             backward_speed: default_backward_speed(),
+            steer_rate: default_steer_rate(),
         }
     }
 }
@@ -125,7 +138,9 @@ impl Vehicle {
         let speeds = "between 0.01 and 50 m/s";
         let is_speed = |v: f64| (0.01..=50.0).contains(&v);
         check("forward_speed", self.forward_speed, is_speed(self.forward_speed), speeds)?;
-        check("backward_speed", self.backward_speed, is_speed(self.backward_speed), speeds)
+        check("backward_speed", self.backward_speed, is_speed(self.backward_speed), speeds)?;
+        let is_rate = (0.01..=50.0).contains(&self.steer_rate);
+        check("steer_rate", self.steer_rate, is_rate, "between 0.01 and 50 rad/s")
     }
 
     /// How many times as long as the default vehicle. Lengths in planners' settings are those
@@ -158,6 +173,11 @@ impl Vehicle {
     /// Rear axle to front bumper, metres.
     pub fn front_extent(&self) -> f64 {
         self.length - self.rear_overhang
+    }
+
+    /// Rear axle to the farthest corner, metres: no point of the footprint is farther from it.
+    pub fn reach(&self) -> f64 {
+        self.rear_overhang.max(self.front_extent()).hypot(self.width / 2.0)
     }
 
     /// The footprint in the vehicle's own frame, grown by `margin` metres on every side.

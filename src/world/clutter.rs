@@ -35,7 +35,17 @@ const fn vehicle(
     max_steer: f64,
     [forward_speed, backward_speed]: [f64; 2],
 ) -> Vehicle {
-    Vehicle { length, width, wheelbase, rear_overhang, max_steer, forward_speed, backward_speed }
+    let [forward_speed, backward_speed, steer_rate] = [forward_speed, backward_speed, 0.6];
+    Vehicle {
+        length,
+        width,
+        wheelbase,
+        rear_overhang,
+        max_steer,
+        forward_speed,
+        backward_speed,
+        steer_rate,
+    }
 }
 
 /// What stands around.

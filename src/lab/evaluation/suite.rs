@@ -28,11 +28,8 @@ pub struct SuiteConfig {
     pub settings: MethodSettings,
     /// Budget of an episode.
     pub budget: Budget,
-    /// Clearance that plans keep where start and goal allow it, metres, 0 to 1: see
-    /// [`crate::planners::Problem::with_margin`].
-    pub margin_m: f64,
-    /// How deep start and goal may reach into obstacles, metres: see [`crate::planners::Problem::allowing_contact`].
-    pub allow_contact_m: f64,
+    /// What plans keep to.
+    pub terms: Terms,
     /// Worker threads. More than one disturbs the times, never the results.
     pub threads: usize,
 }
@@ -264,18 +261,13 @@ pub fn check(cases: &[Case], models: &Models, config: &SuiteConfig) -> Result<()
                 models.check_kind(method, &scene.vehicle, kind)?;
             }
         }
-        goals::first_problem(scene, config.terms())
+        goals::first_problem(scene, config.terms)
             .map_err(|error| SuiteError::Unsolvable { scene: scene.name.clone(), error })?;
     }
     Ok(())
 }
 
 impl SuiteConfig {
-    /// What plans keep to.
-    pub fn terms(&self) -> Terms {
-        Terms { margin: self.margin_m, contact: self.allow_contact_m }
-    }
-
     /// The planners of all methods, in their order.
     pub fn build_all(&self, models: &Models) -> Result<Vec<Box<dyn Planner + Send>>, MethodError> {
         self.methods.iter().map(|m| m.build(models, &self.settings)).collect()
@@ -311,8 +303,7 @@ where
             let (send, next) = (send.clone(), &next);
             scope.spawn(move || {
                 let usual = EpisodeConfig::new(config.budget);
-                let Terms { margin: margin_m, contact: allow_contact_m } = config.terms();
-                let episodes = EpisodeConfig { margin_m, allow_contact_m, ..usual };
+                let episodes = EpisodeConfig { terms: config.terms, ..usual };
                 loop {
                     let job = next.fetch_add(1, Ordering::Relaxed);
                     if job >= total {

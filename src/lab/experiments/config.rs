@@ -16,7 +16,8 @@ use crate::lab::training::worlds::WorldsConfig;
 use crate::n3p::RolloutConfig;
 use crate::n3p::guided::RankedConfig;
 use crate::n3p::{Method, MethodSettings};
-use crate::planners::{Budget, Effort, HybridAStarConfig, Problem};
+use crate::planners::goals::Terms;
+use crate::planners::{Budget, Effort, HybridAStarConfig};
 use crate::toml_file::{Setting, TomlError, read_settings};
 use crate::vehicle::Vehicle;
 use crate::world::generate::GeneratorConfig;
@@ -189,8 +190,7 @@ impl EvaluateConfig {
             methods: methods.to_vec(),
             settings: MethodSettings { planner: self.planner, n3p: self.n3p, rl: self.rl },
             budget: self.budget(),
-            margin_m: Problem::MARGIN,
-            allow_contact_m: 0.0,
+            terms: Terms::default(),
             threads: 1,
         }
     }

@@ -479,7 +479,7 @@ impl Runner<'_> {
             cases.extend(e.drawn(&self.config.vehicle).cases(world)?);
         }
         for folder in self.config.scene_folders() {
-            let found = suite::from_folder(&folder, None, suite_config.terms())?;
+            let found = suite::from_folder(&folder, None, suite_config.terms)?;
             // A record is of all its scenes or of none.
             if let Some(first) = found.unusable.first() {
                 return Err(SuiteError::NoScenes(first.clone()).into());

@@ -1,8 +1,8 @@
 //! The region the rear axle stays in.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use crate::curves::Segment;
+use crate::curves::{Clothoid, Segment};
 use crate::geometry::{Aabb, Pose, Vec2};
 
 /// A convex quadrilateral as half-planes `normal · p ≤ offset`, normals of length one.
@@ -61,6 +61,28 @@ impl ConvexBounds {
         self.sides
             .iter()
             .all(|(n, offset)| n.dot(&middle) < least || n.dot(&center) + radius <= *offset)
+    }
+
+    /// Whether the rear axle stays inside all along a clothoid.
+    pub fn contains_clothoid(&self, start: Pose, motion: Clothoid) -> bool {
+        let Clothoid { from, to, length } = motion;
+        let inside = |s: f64| self.contains(motion.at(start, s).position());
+        // Farthest along a normal it is at an end, or where it heads across that normal.
+        inside(0.0) && inside(length) && self.sides.iter().all(|(normal, _)| {
+            let across = normal.y.atan2(normal.x) + FRAC_PI_2;
+            let half_slope = if from == to { 0.0 } else { (to - from) / (2.0 * length) };
+            let most = (from.abs().max(to.abs()) * length.abs() / PI).ceil() as i32 + 2;
+            let first = ((start.heading - across) / PI).round();
+            (-most..=most).all(|k| {
+                // s·(from + half_slope·s) = the turn to there.
+                let turn = across + PI * (first + f64::from(k)) - start.heading;
+                let root = (from * from + 4.0 * half_slope * turn).sqrt();
+                // In this form neither root is lost where the slope is none.
+                let lengths = [2.0 * turn / (from + root), 2.0 * turn / (from - root)];
+                let is_met = |s: &f64| s.is_finite() && (0.0..=1.0).contains(&(s / length));
+                lengths.iter().filter(|s| is_met(s)).all(|&s| inside(s))
+            })
+        })
     }
 }
 

@@ -9,7 +9,7 @@ mod bounds;
 mod index;
 mod sweep;
 
-use crate::curves::{Path, Segment};
+use crate::curves::{Path, Segment, SmoothPath};
 use crate::geometry::{Aabb, Pose, Vec2, segment_in_box};
 use crate::vehicle::Vehicle;
 
@@ -130,6 +130,12 @@ impl CollisionWorld {
 
     fn stays_in_bounds(&self, start: &BodyFrame, sweep: &Sweep) -> bool {
         self.bounds.as_ref().is_none_or(|b| b.contains_motion(start.pose, sweep.segment()))
+    }
+
+    /// Whether the rear axle stays within the bounds all along `path`.
+    pub fn stays_within_bounds(&self, path: &SmoothPath) -> bool {
+        let Some(bounds) = &self.bounds else { return true };
+        path.legs().all(|(start, motion)| bounds.contains_clothoid(start, motion))
     }
 
     /// Whether a sweep of any footprint, free at its start, touches nothing; neither the bounds nor

@@ -1,0 +1,122 @@
+//! Fitting the lengths of straights and turns to where they are to lead.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::turn::{Piece, Way, then};
+use crate::geometry::{Pose, signed_angle};
+
+/// What a fitted path may miss its goal by, metres and radians.
+const EXACT: f64 = 1e-9;
+/// Steps of Newton's method.
+const STEPS: usize = 12;
+
+/// Changes the values of `pieces` as little as need be so that they lead from `start` to `goal`; `false`
+/// where that takes a negative length, or more steps than usual.
+pub(super) fn fit(pieces: &mut [Piece], start: Pose, goal: Pose) -> bool {
+    let mut ways: Vec<(Way, Way)> = Vec::with_capacity(pieces.len());
+    let mut columns: Vec<Vector3<f64>> = Vec::with_capacity(pieces.len());
+    let mut fixed = vec![false; pieces.len()];
+    // Angles in metres: as the tightest turn sweeps them.
+    let tightest = pieces.iter().map(|p| p.curvature.abs()).fold(0.0, f64::max);
+    if tightest == 0.0 {
+        return miss(pieces, start, goal).is_some_and(|m| m.amax() < EXACT);
+    }
+    let radius = 1.0 / tightest;
+    for _ in 0..STEPS {
+        ways.clear();
+        ways.extend(pieces.iter().map(Piece::way));
+        let whole = ways.iter().fold([start.x, start.y, start.heading], |a, (way, _)| then(a, *way));
+        let miss = missed(whole, goal);
+        if miss.amax() < EXACT {
+            return true;
+        }
+        if !miss.iter().all(|v| v.is_finite()) {
+            return false;
+        }
+        let target = -Vector3::new(miss.x, miss.y, miss.z * radius);
+        columns.clear();
+        let mut at = [start.x, start.y, start.heading];
+        for (piece, (way, change)) in pieces.iter().zip(&ways) {
+            let (sin, cos) = at[2].sin_cos();
+            let after = then(at, *way);
+            let rest = [whole[0] - after[0], whole[1] - after[1]];
+            let dx = cos * change[0] - sin * change[1] - change[2] * rest[1];
+            let dy = sin * change[0] + cos * change[1] + change[2] * rest[0];
+            // Per metre: turns are measured along the tightest arc.
+            let unit = if piece.is_straight() { 1.0 } else { tightest };
+            columns.push(Vector3::new(dx, dy, change[2] * radius) * unit);
+            at = after;
+        }
+        if !step(pieces, &columns, &mut fixed, target, tightest) {
+            return false;
+        }
+    }
+    false
+}
+
+/// One step of Newton's method: the smallest change that would lead to `target` if `columns` told the whole
+/// truth, and lets no value go below its least. `false` where there is none.
+fn step(
+    pieces: &mut [Piece],
+    columns: &[Vector3<f64>],
+    fixed: &mut [bool],
+    target: Vector3<f64>,
+    tightest: f64,
+) -> bool {
+    /// Of the radius, so far at once at most.
+    const FAR: f64 = 0.5;
+    fixed.fill(false);
+    let mut target = target;
+    // What would go below its least goes there, and the others share what is left.
+    for _ in 0..=pieces.len() {
+        let mut square = Matrix3::zeros();
+        let mut free = 0;
+        for (column, _) in columns.iter().zip(fixed.iter()).filter(|(_, fixed)| !**fixed) {
+            square += column * column.transpose();
+            free += 1;
+        }
+        if free < 3 {
+            return false;
+        }
+        let Some(inverse) = square.try_inverse() else { return false };
+        let share = inverse * target;
+        let largest =
+            columns.iter().zip(fixed.iter()).filter(|(_, f)| !**f).map(|(c, _)| c.dot(&share).abs());
+        let largest = largest.fold(0.0, f64::max);
+        if !largest.is_finite() {
+            return false;
+        }
+        let scale = (FAR / tightest / largest).min(1.0);
+        let change = |i: usize, piece: &Piece| {
+            let metres = columns[i].dot(&share) * scale;
+            if piece.is_straight() { metres } else { metres * tightest }
+        };
+        let mut held = false;
+        for (i, piece) in pieces.iter().enumerate() {
+            let least = piece.least();
+            if !fixed[i] && piece.value + change(i, piece) < least - 1e-12 {
+                let unit = if piece.is_straight() { 1.0 } else { tightest };
+                target -= columns[i] * ((least - piece.value) / unit);
+                (fixed[i], held) = (true, true);
+            }
+        }
+        if held {
+            continue;
+        }
+        for (i, piece) in pieces.iter_mut().enumerate() {
+            let value = if fixed[i] { piece.least() } else { piece.value + change(i, piece) };
+            piece.value = value.max(piece.least());
+        }
+        return true;
+    }
+    false
+}
+
+fn missed(whole: Way, goal: Pose) -> Vector3<f64> {
+    Vector3::new(whole[0] - goal.x, whole[1] - goal.y, signed_angle(goal.heading, whole[2]))
+}
+
+fn miss(pieces: &[Piece], start: Pose, goal: Pose) -> Option<Vector3<f64>> {
+    let start = [start.x, start.y, start.heading];
+    Some(missed(pieces.iter().fold(start, |a, piece| then(a, piece.way().0)), goal))
+}

@@ -1,0 +1,158 @@
+//! Making a path smooth: clothoids wherever its curvature jumps while the car drives.
+//!
+//! Fraichard and Scheuer ("From Reeds and Shepp's to continuous-curvature paths", IEEE T-RO 20(6), 2004)
+//! put between a straight and an arc a clothoid, on which the wheels turn steadily. Here a path keeps its
+//! straights and turns, each turn with its clothoids at its ends, and their lengths are fitted so that
+//! the path ends where it did ([`smooth`]): unknowns as many as straights and turns, three equations,
+//! Newton's method, the smallest change of lengths first. Where the car stops to change gear the wheels may
+//! turn at standstill, if that is allowed: no clothoid is needed there.
+
+mod fit;
+mod turn;
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use super::smooth_path::jumps;
+use super::{Clothoid, Path, Segment, SmoothPath};
+use crate::geometry::Pose;
+use crate::vehicle::Vehicle;
+use turn::Piece;
+
+/// Where the steering wheel may be turned while the car stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StandstillSteering {
+    /// Nowhere: the curvature is continuous through changes of gear, too.
+    Never,
+    /// Where the car changes gear, and at the start where nothing else fits.
+    AtChanges,
+    /// Wherever curvature jumps: paths are arcs and straights, as in the paper.
+    #[default]
+    Anywhere,
+}
+
+impl StandstillSteering {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Never, Self::AtChanges, Self::Anywhere];
+
+    /// The name in files and arguments.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Never => "never",
+            Self::AtChanges => "at-changes",
+            Self::Anywhere => "anywhere",
+        }
+    }
+}
+
+impl fmt::Display for StandstillSteering {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for StandstillSteering {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|s| s.name() == text);
+        found.ok_or_else(|| format!("expected never, at-changes or anywhere, not {text:?}"))
+    }
+}
+
+/// How a path is made smooth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Smoothing {
+    /// Whether the wheels may turn at the start, before the car moves; else they are straight there.
+    pub turned_at_start: bool,
+    /// Whether they may turn where the gear changes.
+    pub turned_at_changes: bool,
+    /// |Change of curvature| per metre of a clothoid, 1/m².
+    pub sharpness: f64,
+}
+
+impl Smoothing {
+    /// The sharpness at which a car of so many m/s turns its wheels as fast as it can: at δ = 0, where
+    /// the wheels turn fastest, dδ/ds = L·dκ/ds for the wheelbase L.
+    pub fn sharpness_at(vehicle: &Vehicle, speed: f64) -> f64 {
+        vehicle.steer_rate / (vehicle.wheelbase * speed)
+    }
+
+    /// The speed at which the wheels just keep up with a sharpness, m/s.
+    pub fn speed_at(vehicle: &Vehicle, sharpness: f64) -> f64 {
+        vehicle.steer_rate / (vehicle.wheelbase * sharpness)
+    }
+}
+
+/// `path` with clothoids in place of its jumps of curvature, from the same start to `goal`; `None` where
+/// its straights and turns cannot be fitted.
+///
+/// Nothing is asked of obstacles.
+pub fn smooth(path: &Path, goal: Pose, smoothing: &Smoothing) -> Option<SmoothPath> {
+    let mut pieces = pieces(path, smoothing);
+    if !fit::fit(&mut pieces, path.start, goal) {
+        return None;
+    }
+    let mut motions: Vec<Clothoid> = Vec::with_capacity(2 * pieces.len());
+    for motion in pieces.iter().flat_map(Piece::motions) {
+        match motions.last_mut() {
+            _ if motion.length.abs() < 1e-9 => {}
+            Some(last) if last.is_arc() && motion.is_arc() && last.to == motion.from
+                && last.gear() == motion.gear() => last.length += motion.length,
+            _ => motions.push(motion),
+        }
+    }
+    Some(SmoothPath { start: path.start, motions })
+}
+
+/// The straights and turns of `path`, and straights of no length wherever the wheels are straight between two
+/// turns: one more length to fit.
+fn pieces(path: &Path, smoothing: &Smoothing) -> Vec<Piece> {
+    // Of curvatures that differ by rounding, one.
+    let mut segments: Vec<Segment> = Vec::with_capacity(path.segments.len());
+    for &s in &path.segments {
+        match segments.last_mut() {
+            Some(last) if last.gear() == s.gear() && !jumps(last.curvature, s.curvature) => {
+                last.length += s.length;
+            }
+            _ => segments.push(s),
+        }
+    }
+    let mut pieces = Vec::with_capacity(2 * segments.len() + 1);
+    // What the turns on both sides of a border agree on.
+    let shared = |a: f64, b: f64| if a * b > 0.0 { a.abs().min(b.abs()) } else { 0.0 };
+    for (i, s) in segments.iter().enumerate() {
+        let border = |neighbour: Option<usize>| {
+            let other = segments[neighbour?];
+            let free = other.gear() != s.gear() && smoothing.turned_at_changes;
+            (!free).then(|| shared(other.curvature, s.curvature))
+        };
+        let begin = match i {
+            0 => (!smoothing.turned_at_start).then_some(0.0),
+            _ => border(Some(i - 1)),
+        };
+        let end = border((i + 1 < segments.len()).then_some(i + 1));
+        let gear = s.gear().sign();
+        let sharpness = smoothing.sharpness;
+        let straight = Piece { gear, curvature: 0.0, ends: [None; 2], sharpness, value: 0.0 };
+        if s.curvature == 0.0 {
+            pieces.push(Piece { value: s.length.abs(), ..straight });
+            continue;
+        }
+        let is_turn = |p: &Piece| !p.is_straight() || p.gear != gear;
+        if begin == Some(0.0) && pieces.last().is_none_or(is_turn) {
+            pieces.push(straight);
+        }
+        let (curvature, ends) = (s.curvature, [begin, end]);
+        let turn = Piece { gear, curvature, ends, sharpness, value: s.turn().abs() };
+        pieces.push(Piece { value: turn.value.max(turn.least()), ..turn });
+        let changes = segments.get(i + 1).is_some_and(|next| next.gear() != s.gear());
+        if end == Some(0.0) && changes {
+            pieces.push(straight);
+        }
+    }
+    pieces
+}
