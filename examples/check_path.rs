@@ -54,6 +54,7 @@ fn check_footprints(scene: &Scene, path: &PathFile) -> Result<f64, Violation> {
             gears: vec![1],
             steer: vec![0.0],
             method: path.method.clone(),
+            ..PathFile::default()
         };
         let here = oracle::check(&scene, &standing).map_err(|violation| match violation {
             Violation::Collision { mm, obstacle, .. } => {

@@ -1,13 +1,14 @@
 //! The planner to embed: made once for a vehicle, asked as often as one likes.
 
-use std::borrow::Borrow;
+use std::borrow::{Borrow, Cow};
 use std::num::NonZero;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
+use crate::curves::smoothing::StandstillSteering;
 use crate::curves::trajectory::LimitError;
-use crate::curves::{Path, TrajectoryLimits};
+use crate::curves::{Path, SmoothPath, TrajectoryLimits};
 use crate::geometry::{Frame, Pose};
 use crate::n3p::{Method, MethodError, MethodSettings, Models, ModelsError};
 use crate::output::{Driven, PathFile};
@@ -117,6 +118,13 @@ impl Parker {
     /// The same also from starts and to goals that reach up to `metres` into an obstacle.
     pub fn allow_contact(self, metres: f64) -> Result<Self, ParkerError> {
         Self { terms: Terms { contact: metres, ..self.terms }, ..self }.checked()
+    }
+
+    /// The same with steering that is continuous while the car drives: the wheels turn at standstill only
+    /// where `standstill` lets them. A path that cannot be driven so is none:
+    /// [`NoPath::NotSmooth`](crate::planners::NoPath::NotSmooth).
+    pub fn standstill_steering(self, standstill: StandstillSteering) -> Self {
+        Self { terms: Terms { standstill, ..self.terms }, ..self }
     }
 
     /// Planners kept for later calls, at most: after a crowd of callers the rest would only hold
@@ -237,6 +245,7 @@ impl Parker {
             expansions: result.expansions,
             route: result.guidance.map(|g| g.route),
             path,
+            smooth: result.smooth,
         })
     }
 }
@@ -380,6 +389,7 @@ pub struct Plan {
     expansions: usize,
     route: Option<Route>,
     path: Path,
+    smooth: Option<SmoothPath>,
 }
 
 impl Plan {
@@ -393,21 +403,32 @@ impl Plan {
         self.path.direction_changes()
     }
 
-    /// The path as motions of constant curvature, in the frame of the request.
+    /// The path as motions of constant curvature, in the frame of the request. Where continuous steering was
+    /// asked for these are arcs from which the path is nowhere farther than half of the margin.
     pub fn path(&self) -> Path {
         self.path.to_world(&self.frame)
+    }
+
+    /// The path as motions of steadily changing curvature, in the frame of the request; arcs and straights
+    /// alone, where nothing else was asked for.
+    pub fn smooth_path(&self) -> SmoothPath {
+        self.driven().to_world(&self.frame)
+    }
+
+    fn driven(&self) -> Cow<'_, SmoothPath> {
+        self.smooth.as_ref().map_or_else(|| Cow::Owned(SmoothPath::of(&self.path)), Cow::Borrowed)
     }
 
     /// Poses at most 5 cm apart, each with the gear and the steering angle that follow it: the same
     /// numbers as in path files.
     pub fn poses(&self) -> PathFile {
         let ends = [self.start, self.goal];
-        PathFile::between(ends, &self.vehicle, &self.frame, &self.path, self.method.name())
+        PathFile::between(ends, &self.vehicle, &self.frame, &self.driven(), self.method.name())
     }
 
     /// The path in time.
     pub fn trajectory(&self, limits: &TrajectoryLimits) -> Result<Driven, LimitError> {
-        Driven::new([self.start, self.goal], &self.vehicle, &self.frame, &self.path, limits)
+        Driven::new([self.start, self.goal], &self.vehicle, &self.frame, &self.driven(), limits)
     }
 
     /// Which goal of the request it leads to.

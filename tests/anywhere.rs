@@ -7,7 +7,7 @@ mod lots;
 
 use std::path::Path;
 
-use n3p::curves::TrajectoryLimits;
+use n3p::curves::{SmoothPath, TrajectoryLimits};
 use n3p::geometry::{Frame, Pose, Vec2, signed_angle};
 use n3p::lab::evaluation::oracle;
 use n3p::n3p::{Method, MethodSettings, Models};
@@ -134,7 +134,13 @@ fn far_away_paths_are_as_long_and_pass_the_independent_check() {
                 let ends = [file.poses[0], *file.poses.last().unwrap()];
                 assert_eq!(ends, [there.start, there.goal].map(<[f64; 3]>::from), "{what}");
                 let limits = TrajectoryLimits::default();
-                let file = TrajectoryFile::new(&there, &problem.frame, &path, "far", limits);
+                let file = TrajectoryFile::new(
+                    &there,
+                    &problem.frame,
+                    &SmoothPath::of(&path),
+                    "far",
+                    limits,
+                );
                 let moments = file.expect(&what).moments;
                 let ends = [moments[0].pose, moments.last().unwrap().pose];
                 assert_eq!(ends, [there.start, there.goal], "{what}");

@@ -3,6 +3,7 @@
 #![cfg(feature = "lab")]
 
 use assert_cmd::Command;
+use n3p::curves::smoothing::StandstillSteering;
 use n3p::curves::{Path, Segment};
 use n3p::geometry::{Frame, Pose};
 use n3p::lab::evaluation::oracle;
@@ -22,7 +23,8 @@ use proptest::prelude::{ProptestConfig, any, prop_assert, prop_assert_eq, prop_a
 
 const BUDGET: Budget = Budget::new(20_000);
 const ALLOWED: f64 = 0.05;
-const TERMS: Terms = Terms { margin: Problem::MARGIN, contact: ALLOWED };
+const TERMS: Terms =
+    Terms { margin: Problem::MARGIN, contact: ALLOWED, standstill: StandstillSteering::Anywhere };
 const PILLAR: &str = "tests/fixtures/goals/beside-a-pillar.json";
 
 fn scene(index: u64) -> Scene {

@@ -11,6 +11,7 @@ use n3p::lab::evaluation::suite::{self, SuiteConfig};
 use n3p::lab::evaluation::{oracle, rows};
 use n3p::n3p::{Method, MethodSettings, Models};
 use n3p::output::PathFile;
+use n3p::planners::goals::Terms;
 use n3p::planners::{Budget, Problem};
 use n3p::vehicle::Vehicle;
 use n3p::world::generate::{GeneratorConfig, generate};
@@ -67,7 +68,8 @@ fn plans_keep_the_margin_in_the_eyes_of_the_oracle() {
             let case =
                 Case { scene: scene(kind, Level::Easy, i), kind: Some(kind), level: None, set };
             let usual = EpisodeConfig::new(BUDGET);
-            let config = EpisodeConfig { margin_m: ASKED, repeats: 0, ..usual };
+            let terms = Terms { margin: ASKED, ..Terms::default() };
+            let config = EpisodeConfig { terms, repeats: 0, ..usual };
             let episode = episode::run(&case, planner.as_mut(), &config, &oracle::JUDGE).unwrap();
             let margin = episode.problem.margin;
             whole += usize::from(margin == ASKED);
@@ -133,13 +135,12 @@ fn results_do_not_depend_on_margins_planned_before() {
 fn no_margin_is_the_usual_one() {
     let (models, kinds) = (models(), ParkingType::SQUARE);
     let cases = suite::at_home(&Vehicle::default(), &kinds, &Level::ALL, 3, 11).unwrap();
-    let rows = |margin_m| {
+    let rows = |margin| {
         let config = SuiteConfig {
             methods: vec![Method::HA_RS, Method::N3P],
             settings: MethodSettings::default(),
             budget: BUDGET,
-            margin_m,
-            allow_contact_m: 0.0,
+            terms: Terms { margin, ..Terms::default() },
             threads: 1,
         };
         let mut rows =

@@ -35,7 +35,7 @@ fn parker(scene: &Scene) -> Parker {
 fn a_plan_begins_and_ends_where_it_is_told_to() {
     let parker = Parker::new(Vehicle::default()).unwrap();
     let plan = parker.plan(START, GOAL, &bay()).unwrap();
-    let PathFile { poses, gears, steer, method } = plan.poses();
+    let PathFile { poses, gears, steer, method, .. } = plan.poses();
     assert_eq!((poses[0], poses[poses.len() - 1]), (START.into(), GOAL.into()));
     assert!(gears.len() == poses.len() && steer.len() == poses.len());
     assert_eq!(plan.parking_type(), Some(ParkingType::Reverse));

@@ -8,6 +8,7 @@ use anyhow::Result;
 use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput, PolicyArgs, TermsArgs};
 use n3p::curves::TrajectoryLimits;
+use n3p::curves::smoothing::StandstillSteering;
 use n3p::curves::trajectory::TrajectoryReport;
 use n3p::episode;
 use n3p::episode::{Case, Episode, EpisodeConfig, Judge, SpotReport};
@@ -17,8 +18,9 @@ use n3p::files::{check_writable, reason, write_whole};
 use n3p::geometry::{Pose, signed_angle};
 use n3p::n3p::{Method, MethodSettings, Models, catalogue};
 use n3p::output::TrajectoryFile;
-use n3p::planners::goals::{self, PassedOver};
-use n3p::planners::{Budget, Effort, Problem, ProblemError};
+use n3p::planners::goals::{self, PassedOver, Terms};
+use n3p::planners::{Budget, Effort, NoPath, Problem, ProblemError};
+use n3p::vehicle::Vehicle;
 use n3p::world::Scene;
 
 /// Plans a path for one parking scene.
@@ -50,7 +52,9 @@ struct Args {
     /// Draw scene and path to this SVG file.
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
-    /// Write the trajectory, the path in time, to this .csv or .json file.
+    /// Write the trajectory, the path in time, to this .csv or .json file, or as poses and twists to
+    /// this .ros.json file. The steering is continuous then, as with --standstill-steering at-changes,
+    /// where such a path is found; else the car stops to steer.
     #[arg(long, value_name = "FILE", value_parser = TrajectoryFile::file_name)]
     trajectory: Option<PathBuf>,
     /// Print the result as JSON.
@@ -79,10 +83,17 @@ struct Limits {
     /// The same in backward gear [default: as --acceleration].
     #[arg(long, value_name = "M/S2", value_parser = acceleration, allow_negative_numbers = true)]
     backward_acceleration: Option<f64>,
-    /// How fast the front wheels turn, rad/s.
+    /// Largest lateral acceleration, m/s².
+    #[arg(long, value_name = "M/S2", value_parser = acceleration, allow_negative_numbers = true)]
+    #[arg(default_value_t = TrajectoryLimits::default().lateral_acceleration)]
+    lateral_acceleration: f64,
+    /// How fast the acceleration changes at most, m/s³.
+    #[arg(long, value_name = "M/S3", value_parser = jerk, allow_negative_numbers = true)]
+    #[arg(default_value_t = TrajectoryLimits::default().jerk)]
+    jerk: f64,
+    /// How fast the front wheels turn, rad/s [default: the vehicle's].
     #[arg(long, value_name = "RAD/S", value_parser = steer_rate, allow_negative_numbers = true)]
-    #[arg(default_value_t = TrajectoryLimits::default().steer_rate)]
-    steer_rate: f64,
+    steer_rate: Option<f64>,
     /// Stop wherever the steering angle jumps, and turn the wheels there.
     #[arg(long)]
     stop_to_steer: bool,
@@ -92,16 +103,34 @@ fn acceleration(text: &str) -> std::result::Result<f64, String> {
     cli::within(text, TrajectoryLimits::ACCELERATIONS, "m/s²")
 }
 
+fn jerk(text: &str) -> std::result::Result<f64, String> {
+    cli::within(text, TrajectoryLimits::JERKS, "m/s³")
+}
+
 fn steer_rate(text: &str) -> std::result::Result<f64, String> {
     cli::within(text, TrajectoryLimits::STEER_RATES, "rad/s")
 }
 
+impl Args {
+    /// Where the wheels may turn at standstill: as told, else as little as need be where the path is to be
+    /// driven.
+    fn standstill(&self) -> StandstillSteering {
+        let usual = match self.trajectory {
+            Some(_) if !self.limits.stop_to_steer => StandstillSteering::AtChanges,
+            _ => StandstillSteering::Anywhere,
+        };
+        self.terms.standstill_steering.unwrap_or(usual)
+    }
+}
+
 impl Limits {
-    fn settings(&self) -> TrajectoryLimits {
+    fn settings(&self, vehicle: &Vehicle) -> TrajectoryLimits {
         TrajectoryLimits {
             forward_acceleration: self.acceleration,
             backward_acceleration: self.backward_acceleration.unwrap_or(self.acceleration),
-            steer_rate: self.steer_rate,
+            lateral_acceleration: self.lateral_acceleration,
+            jerk: self.jerk,
+            steer_rate: self.steer_rate.unwrap_or(vehicle.steer_rate),
             stop_to_steer: self.stop_to_steer,
         }
     }
@@ -149,8 +178,19 @@ fn plan(args: &Args) -> Result<ExitCode> {
     // One run, as it comes: the time includes what a first call costs.
     let budget = Budget { max_expansions: args.max_expansions, effort: args.effort };
     let usual = EpisodeConfig::new(budget);
+    // Who drives a path wants one that can be driven without stops to steer.
+    let terms = Terms { standstill: args.standstill(), ..terms };
     let once = EpisodeConfig { repeats: 0, terms, ..usual };
-    let episode = episode::run(&case, planner.as_mut(), &once, &JUDGE)?;
+    let mut episode = episode::run(&case, planner.as_mut(), &once, &JUDGE)?;
+    let is_not_smooth = episode.result.outcome.as_ref().err() == Some(&NoPath::NotSmooth);
+    let stops = is_not_smooth && args.terms.standstill_steering.is_none();
+    if stops {
+        tracing::warn!(
+            "no path on which the steering is continuous was found: the car stops to steer on this one"
+        );
+        let terms = Terms { standstill: StandstillSteering::Anywhere, ..terms };
+        episode = episode::run(&case, planner.as_mut(), &EpisodeConfig { terms, ..once }, &JUDGE)?;
+    }
     tell(&case.scene, &episode);
     let kept = &episode.problem;
     if kept.margin < args.terms.margin && kept.contact.is_none() {
@@ -173,10 +213,12 @@ fn plan(args: &Args) -> Result<ExitCode> {
         write_whole(svg, picture.as_bytes()).map_err(|e| unwritable(svg, e))?;
     }
     // Nobody should drive a path that the independent check refuses.
-    let trajectory = match (&args.trajectory, &episode.result.outcome) {
-        (Some(file), Ok(path)) if episode.row.ok => {
-            let (frame, limits) = (&episode.problem.frame, args.limits.settings());
-            let made = TrajectoryFile::new(&scene, frame, path, method.name(), limits)?;
+    let trajectory = match (&args.trajectory, episode.result.driven()) {
+        (Some(file), Some(path)) if episode.row.ok => {
+            let (frame, limits) = (&episode.problem.frame, args.limits.settings(&scene.vehicle));
+            let stop_to_steer = limits.stop_to_steer || stops;
+            let limits = TrajectoryLimits { stop_to_steer, ..limits };
+            let made = TrajectoryFile::new(&scene, frame, &path, method.name(), limits)?;
             made.write(file).map_err(|e| unwritable(file, e))?;
             Some(made.report)
         }

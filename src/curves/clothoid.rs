@@ -57,7 +57,11 @@ impl Clothoid {
 
     /// Curvature after the signed arc length `s`, 1/m.
     pub fn curvature(self, s: f64) -> f64 {
-        if self.is_arc() { self.from } else { self.from + (self.to - self.from) * (s / self.length) }
+        if self.is_arc() {
+            self.from
+        } else {
+            self.from + (self.to - self.from) * (s / self.length)
+        }
     }
 
     /// The pose after driving the whole motion from `start`. The heading is not wrapped.
@@ -121,9 +125,9 @@ impl From<Segment> for Clothoid {
 mod tests {
     use super::*;
 
-    /// The bicycle in ten thousand steps.
+    /// The bicycle in many steps.
     fn integrated(c: Clothoid, start: Pose) -> Pose {
-        let n = 10_000;
+        let n = 200_000;
         let h = c.length / f64::from(n);
         (0..n).fold(start, |p, i| {
             let s = h * (f64::from(i) + 0.5);

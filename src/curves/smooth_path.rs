@@ -67,6 +67,11 @@ impl SmoothPath {
         self.motions.iter().map(|c| c.sharpness()).fold(0.0, f64::max)
     }
 
+    /// Whether it is made of arcs and straights alone.
+    pub fn is_arcs(&self) -> bool {
+        self.motions.iter().all(|c| c.is_arc())
+    }
+
     /// Places where the curvature jumps while the car drives on in the same gear.
     pub fn jumps(&self) -> usize {
         let jumps = |w: &&[Clothoid]| w[0].gear() == w[1].gear() && jumps(w[0].to, w[1].from);
@@ -127,8 +132,11 @@ impl SmoothPath {
             let n = (c.length.abs() / most).max((c.turn() / TURN).abs()).ceil().max(1.0);
             for i in 0..n as u32 {
                 let [begin, end] = [i, i + 1].map(|i| c.length * f64::from(i) / n);
-                let motion =
-                    Clothoid { from: c.curvature(begin), to: c.curvature(end), length: end - begin };
+                let motion = Clothoid {
+                    from: c.curvature(begin),
+                    to: c.curvature(end),
+                    length: end - begin,
+                };
                 out.push(Step { pose: at(c.at(from, begin)), gear: c.gear(), motion });
                 last = motion;
             }
@@ -147,8 +155,7 @@ impl SmoothPath {
     /// at most σh² (R/8 + l/12), where l is the length of all clothoids.
     pub fn arcs(&self, deviation: f64, vehicle: &Vehicle) -> Path {
         let reach = vehicle.reach();
-        let ramps: f64 =
-            self.motions.iter().filter(|c| !c.is_arc()).map(|c| c.length.abs()).sum();
+        let ramps: f64 = self.motions.iter().filter(|c| !c.is_arc()).map(|c| c.length.abs()).sum();
         let mut path = Path { start: self.start, segments: Vec::with_capacity(self.motions.len()) };
         for c in &self.motions {
             let sharp = c.sharpness();
@@ -160,7 +167,8 @@ impl SmoothPath {
             };
             for i in 0..n as u32 {
                 let middle = c.length * (f64::from(i) + 0.5) / n;
-                path.segments.push(Segment { curvature: c.curvature(middle), length: c.length / n });
+                path.segments
+                    .push(Segment { curvature: c.curvature(middle), length: c.length / n });
             }
         }
         path

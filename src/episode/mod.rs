@@ -185,7 +185,8 @@ fn describe(
     row.mean_abs_steer_change_rad = Some(path.mean_abs_steer_change(vehicle));
     // Checked against the goal that it claims to lead to.
     let scene = case.scene.with_goal(case.scene.all_goals()[goal_index]);
-    let file = PathFile::new(&scene, &problem.frame, path, &row.method);
+    let driven = result.driven()?;
+    let file = PathFile::of_smooth(&scene, &problem.frame, &driven, &row.method);
     let share = result.covered.map(|_| PARKED_COVER);
     match (judge.check)(&scene, &file, share, config.terms.contact) {
         Ok(clearance) => {

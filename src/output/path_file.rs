@@ -9,7 +9,7 @@ use std::path::{Path as FilePath, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::curves::Path;
+use crate::curves::{Clothoid, Path, SmoothPath};
 use crate::files::{reason, write_whole};
 use crate::geometry::{Frame, Pose, Vec2, signed_angle};
 use crate::vehicle::Vehicle;
@@ -23,8 +23,15 @@ pub struct PathFile {
     pub poses: Vec<[f64; 3]>,
     /// +1 forward, −1 backward.
     pub gears: Vec<i8>,
-    /// Angle of the front wheels, radians, positive to the left.
+    /// Angle of the front wheels, radians, positive to the left: where it changes on the way to the next
+    /// pose, that of the mean curvature.
     pub steer: Vec<f64>,
+    /// Where the steering is continuous: the angle at each pose, of the motion that follows it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steer_from: Option<Vec<f64>>,
+    /// And the angle with which that motion ends; in between the curvature changes steadily.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steer_to: Option<Vec<f64>>,
     /// The method that planned it.
     pub method: String,
 }
@@ -58,6 +65,11 @@ impl PathFile {
 
     /// The export of `path`, planned in `frame` for `scene`.
     pub fn new(scene: &Scene, frame: &Frame, path: &Path, method: &str) -> Self {
+        Self::of_smooth(scene, frame, &SmoothPath::of(path), method)
+    }
+
+    /// The same of a path on which the curvature may change steadily.
+    pub fn of_smooth(scene: &Scene, frame: &Frame, path: &SmoothPath, method: &str) -> Self {
         Self::between([scene.start, scene.goal], &scene.vehicle, frame, path, method)
     }
 
@@ -66,7 +78,7 @@ impl PathFile {
         [start, goal]: [Pose; 2],
         vehicle: &Vehicle,
         frame: &Frame,
-        path: &Path,
+        path: &SmoothPath,
         method: &str,
     ) -> Self {
         let near = Near::new(start, frame);
@@ -78,10 +90,16 @@ impl PathFile {
         if let Some(last) = samples.last_mut() {
             last.pose = snap(last.pose, goal);
         }
+        let steer = |curvature: fn(&Clothoid) -> f64| {
+            samples.iter().map(|s| vehicle.steer(curvature(&s.motion))).collect::<Vec<f64>>()
+        };
+        let changes = !path.is_arcs();
         Self {
             poses: samples.iter().map(|s| s.pose.into()).collect(),
             gears: samples.iter().map(|s| s.gear.sign() as i8).collect(),
-            steer: samples.iter().map(|s| vehicle.steer(s.curvature)).collect(),
+            steer: steer(|m| f64::midpoint(m.from, m.to)),
+            steer_from: changes.then(|| steer(|m| m.from)),
+            steer_to: changes.then(|| steer(|m| m.to)),
             method: method.to_owned(),
         }
     }
@@ -104,6 +122,11 @@ impl PathFile {
             return Err(format(format!(
                 "{poses} poses, {gears} gears, {steer} steer; expected equal numbers, at least 1"
             )));
+        }
+        let counts = [&path.steer_from, &path.steer_to].map(|a| a.as_ref().map(Vec::len));
+        if counts != [None; 2] && counts != [Some(poses); 2] {
+            let text = "steer_from and steer_to: expected both or none, as many numbers as poses";
+            return Err(format(text.to_owned()));
         }
         Ok(path)
     }

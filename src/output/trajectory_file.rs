@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use super::path_file::{Near, snap};
 use crate::curves::trajectory::{LimitError, Moment, TrajectoryReport};
-use crate::curves::{Path, Trajectory, TrajectoryLimits};
+use crate::curves::{SmoothPath, Trajectory, TrajectoryLimits};
 use crate::files::write_whole;
 use crate::geometry::{Frame, Pose};
 use crate::vehicle::Vehicle;
@@ -54,7 +54,7 @@ impl Driven {
         [start, goal]: [Pose; 2],
         vehicle: &Vehicle,
         frame: &Frame,
-        path: &Path,
+        path: &SmoothPath,
         limits: &TrajectoryLimits,
     ) -> Result<Self, LimitError> {
         let near = Near::new(start, frame);
@@ -93,7 +93,7 @@ impl TrajectoryFile {
     pub fn new(
         scene: &Scene,
         frame: &Frame,
-        path: &Path,
+        path: &SmoothPath,
         method: &str,
         limits: TrajectoryLimits,
     ) -> Result<Self, LimitError> {
@@ -150,7 +150,8 @@ mod tests {
     fn mirrored_plans_are_driven_in_the_scenes_frame() {
         let (scene, frame, path) = far_and_mirrored();
         let limits = TrajectoryLimits::default();
-        let file = TrajectoryFile::new(&scene, &frame, &path, "ha-rs", limits).unwrap();
+        let file =
+            TrajectoryFile::new(&scene, &frame, &SmoothPath::of(&path), "ha-rs", limits).unwrap();
         let moments = &file.moments;
         let standing: Vec<_> = moments.iter().take_while(|m| m.speed == 0.0).collect();
         assert!(standing.len() > 10, "the wheels take their time");

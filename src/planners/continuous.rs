@@ -13,7 +13,7 @@ use crate::vehicle::Vehicle;
 /// From straight wheels to full lock the gentlest clothoid takes so much of the turning radius, each of the
 /// next half as much, and the last at least so much. At 1 m/s, 0.5 m/s … the wheels of a usual car turn that fast.
 const GENTLEST: f64 = 0.25;
-const SHARPEST: f64 = 0.02;
+const SHARPEST: f64 = 0.0075;
 /// Expansions for a path that is free once it is smooth, and paths that are looked at.
 const EXPANSIONS: usize = 20_000;
 const PATHS: usize = 400;
@@ -49,7 +49,8 @@ pub(super) fn smoothed(
 pub(super) fn deviation(problem: &Problem) -> f64 {
     const LEAST: f64 = 1e-4;
     let scale = problem.vehicle.scale();
-    (problem.margin / 2.0).clamp(LEAST * scale.min(1.0), Problem::usual_margin(&problem.vehicle) / 2.0)
+    (problem.margin / 2.0)
+        .clamp(LEAST * scale.min(1.0), Problem::usual_margin(&problem.vehicle) / 2.0)
 }
 
 /// Whether a smooth path begins at the start, keeps the steering limit and the bounds, and touches nothing:

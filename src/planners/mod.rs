@@ -100,6 +100,12 @@ impl PlanResult {
         Self::with(Err(reason), expansions)
     }
 
+    /// The path as it is driven: smooth, where that was asked for.
+    pub fn driven(&self) -> Option<SmoothPath> {
+        let arcs = self.outcome.as_ref().ok().map(SmoothPath::of);
+        self.smooth.clone().or(arcs)
+    }
+
     fn with(outcome: Result<Path, NoPath>, expansions: usize) -> Self {
         Self { outcome, smooth: None, covered: None, expansions, guidance: None }
     }

@@ -25,7 +25,8 @@ pub(super) fn fit(pieces: &mut [Piece], start: Pose, goal: Pose) -> bool {
     for _ in 0..STEPS {
         ways.clear();
         ways.extend(pieces.iter().map(Piece::way));
-        let whole = ways.iter().fold([start.x, start.y, start.heading], |a, (way, _)| then(a, *way));
+        let whole =
+            ways.iter().fold([start.x, start.y, start.heading], |a, (way, _)| then(a, *way));
         let miss = missed(whole, goal);
         if miss.amax() < EXACT {
             return true;
@@ -80,8 +81,11 @@ fn step(
         }
         let Some(inverse) = square.try_inverse() else { return false };
         let share = inverse * target;
-        let largest =
-            columns.iter().zip(fixed.iter()).filter(|(_, f)| !**f).map(|(c, _)| c.dot(&share).abs());
+        let largest = columns
+            .iter()
+            .zip(fixed.iter())
+            .filter(|(_, f)| !**f)
+            .map(|(c, _)| c.dot(&share).abs());
         let largest = largest.fold(0.0, f64::max);
         if !largest.is_finite() {
             return false;

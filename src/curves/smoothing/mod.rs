@@ -100,8 +100,14 @@ pub fn smooth(path: &Path, goal: Pose, smoothing: &Smoothing) -> Option<SmoothPa
     for motion in pieces.iter().flat_map(Piece::motions) {
         match motions.last_mut() {
             _ if motion.length.abs() < 1e-9 => {}
-            Some(last) if last.is_arc() && motion.is_arc() && last.to == motion.from
-                && last.gear() == motion.gear() => last.length += motion.length,
+            Some(last)
+                if last.is_arc()
+                    && motion.is_arc()
+                    && last.to == motion.from
+                    && last.gear() == motion.gear() =>
+            {
+                last.length += motion.length
+            }
             _ => motions.push(motion),
         }
     }

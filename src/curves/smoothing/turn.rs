@@ -70,7 +70,11 @@ impl Piece {
     pub fn motions(&self) -> [Clothoid; 3] {
         if self.is_straight() {
             let length = self.gear * self.value;
-            return [Clothoid { length, ..Clothoid::default() }, Clothoid::default(), Clothoid::default()];
+            return [
+                Clothoid { length, ..Clothoid::default() },
+                Clothoid::default(),
+                Clothoid::default(),
+            ];
         }
         let (peak, length) = self.arc();
         let [begin, end] = self.ends.map(|end| end.unwrap_or(peak));
@@ -114,7 +118,9 @@ mod tests {
 
     #[test]
     fn a_turn_turns_as_far_as_told_and_knows_how_it_changes() {
-        for ends in [[None, None], [Some(0.0), None], [Some(0.1), Some(0.0)], [Some(0.0), Some(0.0)]] {
+        for ends in
+            [[None, None], [Some(0.0), None], [Some(0.1), Some(0.0)], [Some(0.0), Some(0.0)]]
+        {
             for (gear, curvature) in [(1.0, 0.25), (-1.0, 0.25), (1.0, -0.25), (-1.0, -0.25)] {
                 for more in [0.02, 0.1, 0.7, 2.0] {
                     let piece = Piece { gear, curvature, ends, sharpness: 0.3, value: 0.0 };
@@ -127,7 +133,10 @@ mod tests {
                     let (shorter, _) = Piece { value: piece.value - h, ..piece }.way();
                     for i in 0..3 {
                         let expected = (longer[i] - shorter[i]) / (2.0 * h);
-                        assert!((change[i] - expected).abs() < 1e-3, "{piece:?} {i} {expected} {change:?}");
+                        assert!(
+                            (change[i] - expected).abs() < 1e-3,
+                            "{piece:?} {i} {expected} {change:?}"
+                        );
                     }
                 }
             }

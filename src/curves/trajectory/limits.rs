@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
-use crate::vehicle::Gear;
+use crate::vehicle::{Gear, Vehicle};
 
 /// Limits of a trajectory. Those of speed, one per gear, belong to the
 /// [`Vehicle`](crate::vehicle::Vehicle).
@@ -15,8 +15,11 @@ pub struct TrajectoryLimits {
     pub forward_acceleration: f64,
     /// Largest acceleration when driving backward, m/s²; braking is as strong.
     pub backward_acceleration: f64,
-    /// How fast the front wheels turn, rad/s. The default is about 500°/s at the steering wheel
-    /// of a usual car.
+    /// Largest v²·|κ| at the rear axle, m/s².
+    pub lateral_acceleration: f64,
+    /// How fast the acceleration changes at most, m/s³.
+    pub jerk: f64,
+    /// How fast the front wheels turn, rad/s: see [`TrajectoryLimits::of`].
     pub steer_rate: f64,
     /// Whether the car stops wherever the steering angle jumps by more than
     /// [`Trajectory::STEER_TOLERANCE`](super::Trajectory::STEER_TOLERANCE).
@@ -28,7 +31,9 @@ impl Default for TrajectoryLimits {
         Self {
             forward_acceleration: 1.0,
             backward_acceleration: 1.0,
-            steer_rate: 0.6,
+            lateral_acceleration: 2.0,
+            jerk: 2.0,
+            steer_rate: Vehicle::default().steer_rate,
             stop_to_steer: false,
         }
     }
@@ -49,8 +54,15 @@ pub struct LimitError {
 }
 
 impl TrajectoryLimits {
+    /// The usual limits, and the vehicle's own steering rate.
+    pub fn of(vehicle: &Vehicle) -> Self {
+        Self { steer_rate: vehicle.steer_rate, ..Self::default() }
+    }
+
     /// Accelerations allowed, m/s².
     pub const ACCELERATIONS: RangeInclusive<f64> = 0.01..=50.0;
+    /// Jerks allowed, m/s³.
+    pub const JERKS: RangeInclusive<f64> = 0.01..=1000.0;
     /// Steering rates allowed, rad/s.
     pub const STEER_RATES: RangeInclusive<f64> = 0.01..=50.0;
 
@@ -65,7 +77,9 @@ impl TrajectoryLimits {
         };
         let (accelerations, rates) = (Self::ACCELERATIONS, Self::STEER_RATES);
         check("forward_acceleration", self.forward_acceleration, accelerations.clone(), "m/s²")?;
-        check("backward_acceleration", self.backward_acceleration, accelerations, "m/s²")?;
+        check("backward_acceleration", self.backward_acceleration, accelerations.clone(), "m/s²")?;
+        check("lateral_acceleration", self.lateral_acceleration, accelerations, "m/s²")?;
+        check("jerk", self.jerk, Self::JERKS, "m/s³")?;
         check("steer_rate", self.steer_rate, rates, "rad/s")
     }
 

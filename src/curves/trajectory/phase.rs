@@ -1,6 +1,7 @@
 //! One moment of a trajectory, and the phases that know them all.
 
-use crate::curves::Segment;
+use super::profile::Interval;
+use crate::curves::Clothoid;
 use crate::geometry::{Pose, wrap_angle};
 use crate::vehicle::{Gear, Vehicle};
 
@@ -13,7 +14,7 @@ pub struct Moment {
     pub pose: Pose,
     /// Signed speed, m/s; negative backward.
     pub speed: f64,
-    /// Rate of change of the signed speed from now on, m/s².
+    /// Rate of change of the signed speed, m/s²; where it jumps, the new one.
     pub acceleration: f64,
     /// Angle of the front wheels, radians, positive to the left; where it jumps, the new one.
     pub steer: f64,
@@ -25,50 +26,54 @@ pub struct Moment {
     pub gear: Gear,
 }
 
-/// A part of a trajectory with constant acceleration and steering angle on one segment, or one at
-/// standstill in which the wheels turn steadily.
+/// A part of a trajectory with constant jerk on one motion, or one at standstill in which the wheels turn
+/// steadily.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Phase {
     /// When it begins.
     pub time: f64,
     /// Distance driven until then.
     pub distance: f64,
-    /// Speed then, and its rate of change: positive speeds up in either gear.
-    pub speed: f64,
-    pub acceleration: f64,
-    /// Steering angle then, and its rate of change: zero while driving.
-    pub steer: f64,
-    pub steer_rate: f64,
-    /// The segment driven (or, at standstill, to be driven next), where it begins, and how much
+    /// Speed then, and how it changes: positive speeds up in either gear.
+    pub drive: Interval,
+    /// Steering angle then, and its rate of change, while the car stands.
+    pub standing: Option<(f64, f64)>,
+    /// The motion driven (or, at standstill, to be driven next), where it begins, and how much
     /// of it has been driven.
-    pub segment: Segment,
+    pub motion: Clothoid,
     pub from: Pose,
     pub along: f64,
 }
 
 impl Phase {
-    pub fn stands(&self) -> bool {
-        self.steer_rate != 0.0
-    }
-
     pub fn at(&self, time: f64, vehicle: &Vehicle) -> Moment {
         let t = time - self.time;
-        let gear = self.segment.gear();
+        let gear = self.motion.gear();
         let sign = gear.sign();
-        let driven = self.speed * t + 0.5 * self.acceleration * t * t;
-        let along = (self.along + driven).min(self.segment.length.abs());
-        let pose = self.segment.at(self.from, sign * along);
-        let steer = self.steer + self.steer_rate * t;
+        let driven = self.drive.driven(t).max(0.0);
+        let along = (self.along + driven).min(self.motion.length.abs());
+        let pose = self.motion.at(self.from, sign * along);
+        let steer = match self.standing {
+            Some((steer, rate)) => steer + rate * t,
+            None => vehicle.steer(self.motion.curvature(sign * along)),
+        };
         Moment {
             time,
             pose: Pose::new(pose.x, pose.y, wrap_angle(pose.heading)),
             // Adding zero makes a negative zero a plain one.
-            speed: sign * (self.speed + self.acceleration * t).max(0.0) + 0.0,
-            acceleration: sign * self.acceleration + 0.0,
+            speed: sign * self.drive.speed_after(t).max(0.0) + 0.0,
+            acceleration: sign * self.drive.acceleration_after(t) + 0.0,
             steer,
             curvature: vehicle.curvature(steer),
             distance: self.distance + driven,
             gear,
         }
+    }
+
+    /// The fastest it gets within `duration`, m/s: the speed may peak on the way.
+    pub fn fastest(&self, duration: f64) -> f64 {
+        let Interval { acceleration, jerk, .. } = self.drive;
+        let peak = if jerk == 0.0 { 0.0 } else { (-acceleration / jerk).clamp(0.0, duration) };
+        [0.0, peak, duration].map(|t| self.drive.speed_after(t)).into_iter().fold(0.0, f64::max)
     }
 }

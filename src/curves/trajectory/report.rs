@@ -44,8 +44,12 @@ pub struct TrajectoryReport {
     pub max_backward_speed_mps: f64,
     /// Strongest acceleration or braking, m/s².
     pub max_acceleration_mps2: f64,
-    /// Largest v²·|κ| at the rear axle, m/s².
+    /// Largest v²·|κ| at the rear axle, m/s²: the fastest of each phase by its largest curvature.
     pub max_lateral_acceleration_mps2: f64,
+    /// Fastest change of the acceleration, m/s³.
+    pub max_jerk_mps3: f64,
+    /// How fast the wheels turn at most, jumps aside, rad/s.
+    pub max_steer_rate_radps: f64,
     /// Largest steering angle, to either side, radians.
     pub max_abs_steer_rad: f64,
     /// Whether the wheels never turn faster than the limit: there are no jumps.
@@ -70,6 +74,8 @@ impl TrajectoryReport {
             max_backward_speed_mps: 0.0,
             max_acceleration_mps2: 0.0,
             max_lateral_acceleration_mps2: 0.0,
+            max_jerk_mps3: 0.0,
+            max_steer_rate_radps: 0.0,
             max_abs_steer_rad: 0.0,
             steer_rate_kept: trajectory.jumps.is_empty(),
             max_steer_jump_rad: trajectory.jumps.iter().map(SteerJump::size).fold(0.0, f64::max),
@@ -78,20 +84,30 @@ impl TrajectoryReport {
         };
         let raise = |extreme: &mut f64, value: f64| *extreme = extreme.max(value);
         for (phase, duration) in trajectory.phases_with_durations() {
-            let speed = phase.speed.max(phase.speed + phase.acceleration * duration);
-            let lateral = speed * speed * phase.segment.curvature.abs();
-            let fastest = match phase.segment.gear() {
+            if let Some((steer, rate)) = phase.standing {
+                raise(
+                    &mut report.max_abs_steer_rad,
+                    steer.abs().max((steer + rate * duration).abs()),
+                );
+                raise(&mut report.max_steer_rate_radps, rate.abs());
+                report.standing_s += duration;
+                continue;
+            }
+            let speed = phase.fastest(duration);
+            let ends = [0.0, duration].map(|t| phase.at(phase.time + t, trajectory.vehicle()));
+            let curvature = ends[0].curvature.abs().max(ends[1].curvature.abs());
+            let fastest = match phase.motion.gear() {
                 Gear::Forward => &mut report.max_forward_speed_mps,
                 Gear::Backward => &mut report.max_backward_speed_mps,
             };
             raise(fastest, speed);
-            raise(&mut report.max_acceleration_mps2, phase.acceleration.abs());
-            raise(&mut report.max_lateral_acceleration_mps2, lateral);
-            let turned = phase.steer + phase.steer_rate * duration;
-            raise(&mut report.max_abs_steer_rad, phase.steer.abs().max(turned.abs()));
-            if phase.stands() {
-                report.standing_s += duration;
-            }
+            let acceleration = ends[0].acceleration.abs().max(ends[1].acceleration.abs());
+            raise(&mut report.max_acceleration_mps2, acceleration);
+            raise(&mut report.max_jerk_mps3, phase.drive.jerk.abs());
+            raise(&mut report.max_lateral_acceleration_mps2, speed * speed * curvature);
+            raise(&mut report.max_abs_steer_rad, ends[0].steer.abs().max(ends[1].steer.abs()));
+            let rate = speed * trajectory.steering_per_metre(&phase.motion);
+            raise(&mut report.max_steer_rate_radps, rate);
         }
         report
     }

@@ -230,8 +230,13 @@ mod tests {
 
         let segments = [2.5, -1.0].map(Segment::straight);
         let path = Path::new(Pose::default(), segments);
-        let solved =
-            row(PlanResult { outcome: Ok(path), smooth: None, covered: None, expansions: 4, guidance: None });
+        let solved = row(PlanResult {
+            outcome: Ok(path),
+            smooth: None,
+            covered: None,
+            expansions: 4,
+            guidance: None,
+        });
         assert_eq!((solved.path_length, solved.direction_changes), (3.5, 1));
         assert_eq!(solved.status, Status::NoCurve);
     }

@@ -17,7 +17,7 @@ use std::f64::consts::TAU;
 use parry2d_f64::math::Vector2;
 use parry2d_f64::utils::point_in_poly2d;
 
-use self::body::{Body, Extent, Solid, State};
+use self::body::{Body, Extent, Motion, Solid, State};
 use self::contact::Contacts;
 use crate::episode::{Clearance, Judge, WAY_ENDS};
 use crate::geometry::Pose;
@@ -51,6 +51,8 @@ pub const END_TOL: f64 = 1e-6;
 /// How near each pose must be to where gear and steering lead from the one before,
 /// metres and radians: wide enough for an end that was snapped by [`END_TOL`].
 pub const MOTION_TOL: f64 = 1e-5;
+/// How far the steering angle may jump where it is continuous, radians.
+pub const STEER_TOL: f64 = 1e-6;
 /// To these, and to bounds, comes what coordinates do not resolve where the scene lies: so many times
 /// the distance between neighbouring numbers. Below a nanometre on a city's map, half a micrometre
 /// 10⁶ km away.
@@ -118,6 +120,14 @@ pub enum Violation {
         curvature: f64,
         /// The vehicle's limit, 1/m.
         limit: f64,
+    },
+    /// The steering angle jumps where it is said to be continuous.
+    #[error("pose {pose}: the steering angle jumps by {rad:.2e} rad")]
+    SteerJump {
+        /// Index of the pose.
+        pose: usize,
+        /// How far, radians.
+        rad: f64,
     },
     /// The motion goes against its gear.
     #[error("pose {pose}: moves against gear {gear}")]
@@ -251,21 +261,38 @@ impl Oracle {
         self.end(state(n - 1), share)?;
         let step = CHECK_STEP * (self.vehicle.length / CHECK_LENGTH).min(1.0);
         let mut contacts = Contacts::new(contact_m);
-        let curvature = |i: usize| path.steer[i].tan() / self.vehicle.wheelbase;
+        let curvature = |i: usize| {
+            let angle = |steer: &Option<Vec<f64>>| steer.as_ref().map_or(path.steer[i], |s| s[i]);
+            let curvature = |angle: f64| match angle.abs() < TAU / 4.0 {
+                true => angle.tan() / self.vehicle.wheelbase,
+                false => f64::INFINITY,
+            };
+            [&path.steer_from, &path.steer_to].map(|s| curvature(angle(s)))
+        };
+        let mean = |i: usize| {
+            let [from, to] = curvature(i);
+            (from + to) / 2.0
+        };
         let chord = |i: usize| (state(i + 1).position - state(i).position).length();
-        let length: f64 = (0..n - 1).map(|i| arc(curvature(i), chord(i))).sum();
+        let length: f64 = (0..n - 1).map(|i| arc(mean(i), chord(i))).sum();
         let ends = WAY_ENDS * self.vehicle.scale();
         let way = ends..=length - ends;
         let (mut driven, mut at_ends, mut on_the_way) = (0.0, f64::INFINITY, f64::INFINITY);
         for i in 0..n - 1 {
-            let (curvature, s) =
-                self.motion(i, state(i), state(i + 1), path.gears[i], path.steer[i])?;
-            let steps = (self.corner_motion(curvature, s) / step).ceil().max(1.0) as usize;
+            let ends = curvature(i);
+            if i > 0 && path.gears[i] == path.gears[i - 1] {
+                self.steers_on(i, curvature(i - 1)[1], ends[0], path.steer_from.is_some())?;
+            }
+            let motion = self.motion(i, state(i), state(i + 1), path.gears[i], ends)?;
+            let s = motion.length;
+            let steps = (self.corner_motion(ends[0].abs().max(ends[1].abs()), s) / step)
+                .ceil()
+                .max(1.0) as usize;
             for k in 0..steps {
                 let part = s * k as f64 / steps as f64;
                 let is_way = way.contains(&(driven + part.abs()));
                 let clearance = if is_way { &mut on_the_way } else { &mut at_ends };
-                self.footprint(i, state(i).driven(curvature, part), clearance, &mut contacts)?;
+                self.footprint(i, state(i).driven(motion, part), clearance, &mut contacts)?;
             }
             driven += s.abs();
         }
@@ -305,20 +332,36 @@ impl Oracle {
         if covered >= share - 1e-9 { Ok(()) } else { Err(Violation::Cover { covered, share }) }
     }
 
-    /// Curvature and signed length of the motion from `from` to `to`, or what is wrong
-    /// with it.
+    /// Whether the curvature goes on as it was, where the steering is said to be continuous.
+    fn steers_on(
+        &self,
+        pose: usize,
+        before: f64,
+        after: f64,
+        is_continuous: bool,
+    ) -> Result<(), Violation> {
+        let steer = |curvature: f64| (curvature * self.vehicle.wheelbase).atan();
+        let rad = (steer(after) - steer(before)).abs();
+        if is_continuous && rad > STEER_TOL {
+            Err(Violation::SteerJump { pose, rad })
+        } else {
+            Ok(())
+        }
+    }
+
+    /// The motion from `from` to `to`, or what is wrong with it.
     fn motion(
         &self,
         pose: usize,
         from: State,
         to: State,
         gear: i8,
-        steer: f64,
-    ) -> Result<(f64, f64), Violation> {
-        let curvature = steer.tan() / self.vehicle.wheelbase;
+        curvatures: [f64; 2],
+    ) -> Result<Motion, Violation> {
         let limit = self.vehicle.max_steer.tan() / self.vehicle.wheelbase;
-        if curvature.abs() > limit * (1.0 + CURVATURE_TOL) || steer.abs() >= TAU / 4.0 {
-            return Err(Violation::Curvature { pose, curvature: curvature.abs(), limit });
+        let curvature = curvatures[0].abs().max(curvatures[1].abs());
+        if curvature > limit * (1.0 + CURVATURE_TOL) {
+            return Err(Violation::Curvature { pose, curvature, limit });
         }
         let step = to.position - from.position;
         let chord = step.length();
@@ -330,14 +373,16 @@ impl Oracle {
         if along * f64::from(gear) < -(MOTION_TOL + self.rounding) {
             return Err(Violation::Gear { pose, gear });
         }
-        let s = arc(curvature, chord) * f64::from(gear);
-        let (metres, rad) = from.driven(curvature, s).apart(to);
+        let [begin, end] = curvatures;
+        let length = arc((begin + end) / 2.0, chord) * f64::from(gear);
+        let motion = Motion { from: begin, to: end, length };
+        let (metres, rad) = from.driven(motion, length).apart(to);
         // A chord that is a little too long turns a little too far.
-        let turn = self.rounding * curvature.abs();
+        let turn = self.rounding * curvature;
         if metres > MOTION_TOL + self.rounding || rad > MOTION_TOL + turn {
             return Err(Violation::Motion { pose, mm: metres * 1e3, rad });
         }
-        Ok((curvature, s))
+        Ok(motion)
     }
 
     /// Tests one footprint, and lowers `clearance` to its distance from the obstacles.

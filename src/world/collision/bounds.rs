@@ -68,21 +68,23 @@ impl ConvexBounds {
         let Clothoid { from, to, length } = motion;
         let inside = |s: f64| self.contains(motion.at(start, s).position());
         // Farthest along a normal it is at an end, or where it heads across that normal.
-        inside(0.0) && inside(length) && self.sides.iter().all(|(normal, _)| {
-            let across = normal.y.atan2(normal.x) + FRAC_PI_2;
-            let half_slope = if from == to { 0.0 } else { (to - from) / (2.0 * length) };
-            let most = (from.abs().max(to.abs()) * length.abs() / PI).ceil() as i32 + 2;
-            let first = ((start.heading - across) / PI).round();
-            (-most..=most).all(|k| {
-                // s·(from + half_slope·s) = the turn to there.
-                let turn = across + PI * (first + f64::from(k)) - start.heading;
-                let root = (from * from + 4.0 * half_slope * turn).sqrt();
-                // In this form neither root is lost where the slope is none.
-                let lengths = [2.0 * turn / (from + root), 2.0 * turn / (from - root)];
-                let is_met = |s: &f64| s.is_finite() && (0.0..=1.0).contains(&(s / length));
-                lengths.iter().filter(|s| is_met(s)).all(|&s| inside(s))
+        inside(0.0)
+            && inside(length)
+            && self.sides.iter().all(|(normal, _)| {
+                let across = normal.y.atan2(normal.x) + FRAC_PI_2;
+                let half_slope = if from == to { 0.0 } else { (to - from) / (2.0 * length) };
+                let most = (from.abs().max(to.abs()) * length.abs() / PI).ceil() as i32 + 2;
+                let first = ((start.heading - across) / PI).round();
+                (-most..=most).all(|k| {
+                    // s·(from + half_slope·s) = the turn to there.
+                    let turn = across + PI * (first + f64::from(k)) - start.heading;
+                    let root = (from * from + 4.0 * half_slope * turn).sqrt();
+                    // In this form neither root is lost where the slope is none.
+                    let lengths = [2.0 * turn / (from + root), 2.0 * turn / (from - root)];
+                    let is_met = |s: &f64| s.is_finite() && (0.0..=1.0).contains(&(s / length));
+                    lengths.iter().filter(|s| is_met(s)).all(|&s| inside(s))
+                })
             })
-        })
     }
 }
 

@@ -10,6 +10,14 @@ use parry2d_f64::transformation::convex_polygons_intersection_points;
 use super::PENETRATION_TOL;
 use crate::vehicle::Vehicle;
 
+/// A motion whose curvature changes steadily from one value to another, 1/m, over a signed length, metres.
+#[derive(Clone, Copy)]
+pub(super) struct Motion {
+    pub from: f64,
+    pub to: f64,
+    pub length: f64,
+}
+
 /// A rear-axle pose in local coordinates.
 #[derive(Clone, Copy)]
 pub(super) struct State {
@@ -18,9 +26,32 @@ pub(super) struct State {
 }
 
 impl State {
+    /// After the signed arc length `s` of `motion`.
+    pub fn driven(self, motion: Motion, s: f64) -> State {
+        if motion.from == motion.to { self.on_arc(motion.from, s) } else { self.steered(motion, s) }
+    }
+
+    /// The bicycle, integrated by the method of Runge and Kutta.
+    fn steered(self, motion: Motion, s: f64) -> State {
+        const STEPS: usize = 4;
+        let slope = (motion.to - motion.from) / motion.length;
+        let h = s / STEPS as f64;
+        let way = |heading: f64| Vector2::new(heading.cos(), heading.sin());
+        let mut state = self;
+        for i in 0..STEPS {
+            // The heading is known at every moment; its rate is the curvature.
+            let begin = motion.from + slope * h * i as f64;
+            let turned = |part: f64| state.heading + part * h * (begin + slope * part * h / 2.0);
+            let [a, b, c] = [0.0, 0.5, 1.0].map(|part| way(turned(part)));
+            let heading = turned(1.0);
+            state = State { position: state.position + (a + b * 4.0 + c) * (h / 6.0), heading };
+        }
+        state
+    }
+
     /// After the signed arc length `s` at `curvature`: the chord of the arc, at the
     /// mean heading.
-    pub fn driven(self, curvature: f64, s: f64) -> State {
+    fn on_arc(self, curvature: f64, s: f64) -> State {
         let turn = curvature * s;
         let half = turn / 2.0;
         let chord = if half.abs() < 1e-8 { s } else { s * half.sin() / half };
