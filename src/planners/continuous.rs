@@ -5,7 +5,7 @@
 //! does not fit, a search looks for other paths that do: a path counts there only if it is free once it is smooth.
 
 use super::hybrid_astar::HybridAStar;
-use super::{Budget, HybridAStarConfig, NoPath, PlanResult, Problem, Route, is_drivable};
+use super::{Budget, HybridAStarConfig, NoPath, PlanResult, Problem, Route, keeps_limits};
 use crate::curves::smoothing::{Smoothing, StandstillSteering, smooth};
 use crate::curves::{Path, SmoothPath};
 use crate::vehicle::Vehicle;
@@ -18,16 +18,15 @@ const SHARPEST: f64 = 0.0075;
 const EXPANSIONS: usize = 20_000;
 const PATHS: usize = 400;
 
-/// The sharpness of clothoids that are tried in turn, 1/m².
-fn sharpnesses(vehicle: &Vehicle) -> impl Iterator<Item = f64> + use<> {
+/// The sharpness of the clothoids that a run of a path can have, the gentlest first, 1/m².
+fn sharpnesses(vehicle: &Vehicle) -> Vec<f64> {
     let curvature = vehicle.max_curvature();
     let lengths = std::iter::successors(Some(GENTLEST), |share| Some(share / 2.0));
     let lengths = lengths.take_while(|&share| share >= SHARPEST);
-    lengths.map(move |share| curvature * curvature / share)
+    lengths.map(move |share| curvature * curvature / share).collect()
 }
 
-/// `path` with clothoids, if it can be driven so: the gentlest that are free, with straight wheels at the
-/// start if possible.
+/// `path` with clothoids, if it can be driven so, with straight wheels at the start if possible.
 pub(super) fn smoothed(
     problem: &Problem,
     path: &Path,
@@ -35,13 +34,37 @@ pub(super) fn smoothed(
 ) -> Option<SmoothPath> {
     let turned_at_changes = standstill == StandstillSteering::AtChanges;
     let starts: &[bool] = if turned_at_changes { &[false, true] } else { &[false] };
-    let goal = path.end();
-    starts.iter().find_map(|&turned_at_start| {
-        sharpnesses(&problem.vehicle).find_map(|sharpness| {
-            let smoothing = Smoothing { turned_at_start, turned_at_changes, sharpness };
-            smooth(path, goal, &smoothing).filter(|smooth| is_smoothly_drivable(problem, smooth))
-        })
-    })
+    starts.iter().find_map(|&at_start| smoothed_from(problem, path, at_start, turned_at_changes))
+}
+
+/// [`smoothed`] with every clothoid as gentle as may be: the runs on which the car would touch something
+/// become sharper one step at a time, and all of them where that does not help.
+fn smoothed_from(
+    problem: &Problem,
+    path: &Path,
+    turned_at_start: bool,
+    turned_at_changes: bool,
+) -> Option<SmoothPath> {
+    let (goal, choice) = (path.end(), sharpnesses(&problem.vehicle));
+    let mut steps = vec![0; path.direction_changes() + 1];
+    let mut sharpness = Vec::with_capacity(steps.len());
+    loop {
+        sharpness.clear();
+        sharpness.extend(steps.iter().map(|&step: &usize| choice[step]));
+        let smoothing = Smoothing { turned_at_start, turned_at_changes, sharpness: &sharpness };
+        let smooth = smooth(path, goal, &smoothing);
+        let touching = match smooth.map(|smooth| checked(problem, smooth)) {
+            Some(Ok(smooth)) => return Some(smooth),
+            Some(Err(touching)) => touching,
+            None => None,
+        };
+        let sharpest = choice.len() - 1;
+        match touching.filter(|&run| steps[run] < sharpest) {
+            Some(run) => steps[run] += 1,
+            None if steps.iter().all(|&step| step == sharpest) => return None,
+            None => steps.iter_mut().for_each(|step| *step = (*step + 1).min(sharpest)),
+        }
+    }
 }
 
 /// How far the car may come from where the exact check sees it, metres: half of the margin, if there is one,
@@ -53,12 +76,26 @@ pub(super) fn deviation(problem: &Problem) -> f64 {
         .clamp(LEAST * scale.min(1.0), Problem::usual_margin(&problem.vehicle) / 2.0)
 }
 
-/// Whether a smooth path begins at the start, keeps the steering limit and the bounds, and touches nothing:
-/// arcs that it is nowhere farther from than [`deviation`] keep the margin.
-fn is_smoothly_drivable(problem: &Problem, path: &SmoothPath) -> bool {
-    path.jumps() == 0
-        && is_drivable(problem, &path.arcs(deviation(problem), &problem.vehicle))
-        && problem.collision.stays_within_bounds(path)
+/// The certificate of a smooth path: it begins at the start, keeps the steering limit and the bounds, and
+/// touches nothing: arcs that it is nowhere farther from than [`deviation`] keep the margin. Where it touches
+/// something, the first run on which it does is known.
+fn checked(problem: &Problem, path: SmoothPath) -> Result<SmoothPath, Option<usize>> {
+    let arcs = path.arcs(deviation(problem), &problem.vehicle);
+    let mut run = 0;
+    let mut gear = arcs.segments.first().map(|s| s.gear());
+    for (from, segment) in arcs.legs() {
+        if gear != Some(segment.gear()) {
+            (run, gear) = (run + 1, Some(segment.gear()));
+        }
+        if !problem.collision.segment_is_free(from, segment) {
+            return Err(Some(run));
+        }
+    }
+    let is_kept = path.jumps() == 0
+        && problem.collision.pose_is_free(path.start)
+        && keeps_limits(problem, &arcs)
+        && problem.collision.stays_within_bounds(&path);
+    if is_kept { Ok(path) } else { Err(None) }
 }
 
 /// A planner's result with its path made smooth, as `standstill` asks for.

@@ -118,11 +118,15 @@ pub const PARKED_COVER: f64 = 0.9;
 /// Whether a path begins at the start, keeps the steering limit and touches nothing but what the
 /// start or the goal may touch, which it only leaves or only enters.
 fn is_drivable(problem: &Problem, path: &Path) -> bool {
+    problem.collision.path_is_free(path) && keeps_limits(problem, path)
+}
+
+/// [`is_drivable`] of a path that is known to touch nothing that neither start nor goal touches.
+fn keeps_limits(problem: &Problem, path: &Path) -> bool {
     /// Stored curvatures are rounded to single precision.
     const ROUNDING: f64 = 1.0 + 1e-6;
     path.max_abs_curvature() <= problem.vehicle.max_curvature() * ROUNDING
         && path.start.distance(problem.start) < Problem::ROUNDING
-        && problem.collision.path_is_free(path)
         && problem.contact.as_ref().is_none_or(|c| c.is_only_left(&problem.vehicle, path))
 }
 

@@ -65,32 +65,28 @@ impl FromStr for StandstillSteering {
 
 /// How a path is made smooth.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Smoothing {
+pub struct Smoothing<'a> {
     /// Whether the wheels may turn at the start, before the car moves; else they are straight there.
     pub turned_at_start: bool,
     /// Whether they may turn where the gear changes.
     pub turned_at_changes: bool,
-    /// |Change of curvature| per metre of a clothoid, 1/m².
-    pub sharpness: f64,
+    /// |Change of curvature| per metre of the clothoids of each run, the part of a path from one change of
+    /// gear to the next, 1/m².
+    pub sharpness: &'a [f64],
 }
 
-impl Smoothing {
+impl Smoothing<'_> {
     /// The sharpness at which a car of so many m/s turns its wheels as fast as it can: at δ = 0, where
     /// the wheels turn fastest, dδ/ds = L·dκ/ds for the wheelbase L.
     pub fn sharpness_at(vehicle: &Vehicle, speed: f64) -> f64 {
         vehicle.steer_rate / (vehicle.wheelbase * speed)
-    }
-
-    /// The speed at which the wheels just keep up with a sharpness, m/s.
-    pub fn speed_at(vehicle: &Vehicle, sharpness: f64) -> f64 {
-        vehicle.steer_rate / (vehicle.wheelbase * sharpness)
     }
 }
 
 /// `path` with clothoids in place of its jumps of curvature, from the same start to `goal`; `None` where
 /// its straights and turns cannot be fitted.
 ///
-/// Nothing is asked of obstacles.
+/// Nothing is asked of obstacles. The sharpness of runs beyond those given is that of the last one given.
 pub fn smooth(path: &Path, goal: Pose, smoothing: &Smoothing) -> Option<SmoothPath> {
     let mut pieces = pieces(path, smoothing);
     if !fit::fit(&mut pieces, path.start, goal) {
@@ -106,7 +102,7 @@ pub fn smooth(path: &Path, goal: Pose, smoothing: &Smoothing) -> Option<SmoothPa
                     && last.to == motion.from
                     && last.gear() == motion.gear() =>
             {
-                last.length += motion.length
+                last.length += motion.length;
             }
             _ => motions.push(motion),
         }
@@ -130,7 +126,9 @@ fn pieces(path: &Path, smoothing: &Smoothing) -> Vec<Piece> {
     let mut pieces = Vec::with_capacity(2 * segments.len() + 1);
     // What the turns on both sides of a border agree on.
     let shared = |a: f64, b: f64| if a * b > 0.0 { a.abs().min(b.abs()) } else { 0.0 };
+    let mut run = 0;
     for (i, s) in segments.iter().enumerate() {
+        run += usize::from(i > 0 && segments[i - 1].gear() != s.gear());
         let border = |neighbour: Option<usize>| {
             let other = segments[neighbour?];
             let free = other.gear() != s.gear() && smoothing.turned_at_changes;
@@ -142,7 +140,7 @@ fn pieces(path: &Path, smoothing: &Smoothing) -> Vec<Piece> {
         };
         let end = border((i + 1 < segments.len()).then_some(i + 1));
         let gear = s.gear().sign();
-        let sharpness = smoothing.sharpness;
+        let sharpness = smoothing.sharpness[run.min(smoothing.sharpness.len() - 1)];
         let straight = Piece { gear, curvature: 0.0, ends: [None; 2], sharpness, value: 0.0 };
         if s.curvature == 0.0 {
             pieces.push(Piece { value: s.length.abs(), ..straight });
