@@ -45,6 +45,8 @@ pub enum Stream {
     Angled = 16,
     /// A world to learn manoeuvres in.
     World = 20,
+    /// Errors that a driven car meets.
+    Drive = 22,
     /// Where on the way a car begins, to learn what is foreseen from there.
     Foresight = 21,
 }

@@ -8,9 +8,10 @@ use anyhow::Result;
 use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput, PolicyArgs, TermsArgs};
 use n3p::episode::Case;
+use n3p::lab::driving::{DriveConfig, drive};
 use n3p::lab::evaluation::report::{self, Provenance};
 use n3p::lab::evaluation::suite::{self, Drawn, SuiteConfig, SuiteError, World};
-use n3p::lab::evaluation::{Outputs, metrics, quality};
+use n3p::lab::evaluation::{Outputs, drives, metrics, quality};
 use n3p::lab::progress;
 use n3p::lab::training;
 use n3p::n3p::{Method, MethodSettings, Models};
@@ -75,9 +76,54 @@ struct Args {
     /// costs more than usual, "most" always does, with half of the budget.
     #[arg(long, default_value_t, value_name = "first|usual|most")]
     effort: Effort,
+    /// Drive each path in closed loop, with an ordinary controller, in a car with lags and errors; a table
+    /// says what became of it, and DIR/drives.csv of --out has a line each.
+    #[arg(long)]
+    drive: bool,
+    #[command(flatten)]
+    driving: Driving,
     /// Worker threads; more than one disturbs the times, never the results.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
+}
+
+/// What the driven car has to put up with.
+#[derive(clap::Args)]
+#[command(next_help_heading = "With --drive")]
+#[group(requires = "drive")]
+struct Driving {
+    /// Standard deviation of each measured position, metres.
+    #[arg(long, value_name = "METRES", value_parser = noise, allow_negative_numbers = true)]
+    #[arg(default_value_t = DriveConfig::default().position_noise_m)]
+    position_noise: f64,
+    /// Of where each obstacle stands, metres.
+    #[arg(long, value_name = "METRES", value_parser = noise, allow_negative_numbers = true)]
+    #[arg(default_value_t = DriveConfig::default().obstacle_noise_m)]
+    obstacle_noise: f64,
+    /// Time constant of the steering, seconds.
+    #[arg(long, value_name = "SECONDS", value_parser = lag, allow_negative_numbers = true)]
+    #[arg(default_value_t = DriveConfig::default().steering_lag_s)]
+    steering_lag: f64,
+}
+
+fn noise(text: &str) -> Result<f64, String> {
+    cli::within(text, 0.0..=1.0, "metres")
+}
+
+fn lag(text: &str) -> Result<f64, String> {
+    cli::within(text, 0.0..=2.0, "seconds")
+}
+
+impl Driving {
+    fn config(&self, seed: u64) -> DriveConfig {
+        DriveConfig {
+            position_noise_m: self.position_noise,
+            obstacle_noise_m: self.obstacle_noise,
+            steering_lag_s: self.steering_lag,
+            seed,
+            ..DriveConfig::default()
+        }
+    }
 }
 
 fn main() -> ExitCode {
@@ -120,6 +166,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
     let mut outputs = Outputs::create(args.out.as_deref(), args.paths.as_deref()).or_bad_input()?;
 
     let bar = progress::bar((cases.len() * config.methods.len()) as u64, "evaluate");
+    let driving = args.drive.then(|| args.driving.config(args.seed));
     let mut narrow = BTreeSet::new();
     let rows = suite::run(&cases, &models, &config, 0, |case, episode| {
         if episode.problem.margin < args.terms.margin {
@@ -127,6 +174,9 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
         }
         bar.set_message(format!("{} {}", episode.row.method, episode.row.scene));
         bar.inc(1);
+        if let Some(drive) = driving.as_ref().and_then(|config| drive(case, episode, config)) {
+            outputs.take_drive(drive.row);
+        }
         outputs.take(case, episode, &models).map_err(anyhow::Error::from)
     });
     // As in the checks before: a suite that cannot run is the user's to mend, a full disk is not.
@@ -146,16 +196,22 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
     }
 
     let provenance = Provenance::here(title, args.seed, config.budget, args.threads.into());
+    let drives = outputs.drives().to_vec();
     outputs.finish("Evaluation", &cases, &mut rows, &[], &provenance)?;
     if args.json {
         let groups = metrics::summarise(&rows, args.seed);
         let quality = quality::summarise(&rows);
         let all = serde_json::json!({
             "provenance": provenance, "rows": rows, "groups": groups, "quality": quality,
+            "drives": drives,
         });
         cli::print(format!("{all:#}"))?;
     } else {
-        cli::print(report::text(&rows, args.seed).trim_end())?;
+        let mut text = report::text(&rows, args.seed);
+        if args.drive {
+            text += &format!("\n{}", drives::table(&drives).text());
+        }
+        cli::print(text.trim_end())?;
     }
     // Everything is written; the exit code still says that not everything was evaluated.
     complaint.map_or(Ok(ExitCode::SUCCESS), |text| Err(BadInput(text).into()))

@@ -1,6 +1,6 @@
 //! One episode: one method on one scene, timed, checked and told.
 
-mod clearance;
+pub mod clearance;
 pub mod comparison;
 mod row;
 mod spot_report;

@@ -7,10 +7,12 @@
 //! - [`rl`]: policies of reinforcement learning
 //! - [`dataset`]: collecting samples into Parquet, and reading them back
 //! - [`training`]: rows → artefacts
+//! - [`driving`]: plans driven in closed loop by a car with lags and errors
 //! - [`evaluation`]: the independent oracle, rows, tables, reports
 //! - [`experiments`]: a whole pipeline from one versioned file
 
 pub mod dataset;
+pub mod driving;
 pub mod evaluation;
 pub mod experiments;
 pub mod nn;

@@ -36,8 +36,8 @@ pub struct Trajectory {
     vehicle: Vehicle,
     phases: Vec<Phase>,
     jumps: Vec<SteerJump>,
-    /// How often the car starts to drive.
-    runs: usize,
+    /// When and where along the path the car comes to stand.
+    halts: Vec<(f64, f64)>,
     end: Moment,
 }
 
@@ -69,7 +69,8 @@ impl Trajectory {
             distance: 0.0,
             gear: Gear::Forward,
         };
-        let mut made = Self { vehicle: *vehicle, phases: vec![], jumps: vec![], runs: 0, end };
+        let mut made =
+            Self { vehicle: *vehicle, phases: vec![], jumps: vec![], halts: vec![], end };
         let goes_on = |(_, a): &(Pose, Clothoid), (_, b): &(Pose, Clothoid)| {
             let jump = vehicle.steer(b.from) - vehicle.steer(a.to);
             let smooth = jump.abs() <= Self::STEER_TOLERANCE;
@@ -184,7 +185,7 @@ impl Trajectory {
         }
         let (from, last) = legs[legs.len() - 1];
         let pose = last.end(from);
-        self.runs += 1;
+        self.halts.push((time, distance));
         self.end = Moment {
             time,
             pose: Pose::new(pose.x, pose.y, wrap_angle(pose.heading)),
@@ -193,6 +194,11 @@ impl Trajectory {
             gear,
             ..self.end
         };
+    }
+
+    /// When, seconds, and where along the path, metres, the car comes to stand, the end included.
+    pub fn halts(&self) -> &[(f64, f64)] {
+        &self.halts
     }
 
     /// The moment of arrival. For a path of no length it is the start.

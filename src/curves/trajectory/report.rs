@@ -68,7 +68,7 @@ impl TrajectoryReport {
         let mut report = Self {
             duration_s: end.time,
             distance_m: end.distance,
-            stops: trajectory.runs.saturating_sub(1),
+            stops: trajectory.halts.len().saturating_sub(1),
             standing_s: 0.0,
             max_forward_speed_mps: 0.0,
             max_backward_speed_mps: 0.0,

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::drives;
 use super::html;
 use super::learning_curve::CurvePoint;
 use super::report::{self, Provenance};
@@ -11,6 +12,7 @@ use super::rows::{self, RowWriter, RowsError};
 use super::trace::{self, Trace, TraceWriter};
 use crate::episode::{self, Case, Episode, Row};
 use crate::files::{reason, remove_leftovers, write_whole};
+use crate::lab::driving::DriveRow;
 use crate::n3p::Models;
 use crate::output::{PathFile, PathFileError};
 
@@ -19,6 +21,7 @@ pub struct Outputs {
     out: Option<PathBuf>,
     paths: Option<PathBuf>,
     writers: Option<(TraceWriter, RowWriter)>,
+    drives: Vec<DriveRow>,
 }
 
 const TRACES: &str = "traces.jsonl";
@@ -66,7 +69,8 @@ impl Outputs {
             Ok((traces, RowWriter::create(&dir.join("rows.csv"))?))
         };
         let writers = out.map(begin).transpose()?;
-        Ok(Self { out: out.map(Path::to_owned), paths: paths.map(Path::to_owned), writers })
+        let [out, paths] = [out, paths].map(|path| path.map(Path::to_owned));
+        Ok(Self { out, paths, writers, drives: Vec::new() })
     }
 
     /// As [`Outputs::create`] for `out`, keeping the rows that an interrupted run left, and
@@ -101,6 +105,16 @@ impl Outputs {
             path.write(&dir.join(PathFile::file_name(&case.scene, &episode.row.method)))?;
         }
         Ok(())
+    }
+
+    /// Keeps what became of a plan that was driven.
+    pub fn take_drive(&mut self, drive: DriveRow) {
+        self.drives.push(drive);
+    }
+
+    /// What became of the plans that were driven, so far.
+    pub fn drives(&self) -> &[DriveRow] {
+        &self.drives
     }
 
     fn push(&mut self, row: &Row) -> Result<(), OutputError> {
@@ -138,7 +152,13 @@ impl Outputs {
             let path = dir.join(name);
             write_whole(&path, text.as_bytes()).map_err(|error| OutputError::File { path, error })
         };
-        write("report.md", report::markdown(title, rows, curve, provenance))?;
+        let mut markdown = report::markdown(title, rows, curve, provenance);
+        if !self.drives.is_empty() {
+            let table = drives::table(&self.drives).markdown();
+            markdown += &format!("\n{table}\n{}\n", drives::NOTE);
+            write("drives.csv", drives::csv(&self.drives))?;
+        }
+        write("report.md", markdown)?;
         let shown = html::gallery::chosen(cases, rows);
         let scenes = shown.iter().map(|c| c.scene.name.as_str()).collect();
         let path = dir.join(TRACES);

@@ -1,0 +1,111 @@
+//! What became of plans that were driven: a line per scene and method as CSV, and a table.
+
+use std::fmt::Write;
+
+use super::metrics::percentile;
+use super::table::{Table, kind_name, part_name};
+use crate::lab::driving::DriveRow;
+
+/// How to read the table.
+pub(super) const NOTE: &str = "\
+Each path was driven in closed loop by an ordinary tracking controller, with errors of localisation and of \
+where obstacles stand, and with lags of steering and speed. “Parked” are the scenes in which the car ended within \
+5 cm and 1° of where it was to park and touched nothing, “beside” is the largest distance of the rear axle from \
+its path on the way, “time” the time it drove, “standing” what of it the trajectory stands and turns the wheels.";
+
+/// The table; empty without drives.
+pub fn table(drives: &[DriveRow]) -> Table {
+    let mut lines = Vec::new();
+    let mut groups: Vec<(&DriveRow, Vec<&DriveRow>)> = Vec::new();
+    let is_same = |a: &DriveRow, b: &DriveRow| {
+        (&a.set, a.level, a.kind, &a.method) == (&b.set, b.level, b.kind, &b.method)
+    };
+    for drive in drives {
+        match groups.iter_mut().find(|(first, _)| is_same(first, drive)) {
+            Some((_, all)) => all.push(drive),
+            None => groups.push((drive, vec![drive])),
+        }
+    }
+    for (first, all) in groups {
+        let sorted = |value: fn(&DriveRow) -> f64| {
+            let mut values: Vec<f64> = all.iter().map(|d| value(d)).collect();
+            values.sort_by(f64::total_cmp);
+            values
+        };
+        let mean = |value: fn(&DriveRow) -> f64| {
+            all.iter().map(|d| value(d)).sum::<f64>() / all.len() as f64
+        };
+        let (beside, off) = (sorted(|d| d.deviation_m * 100.0), sorted(|d| d.off_m * 100.0));
+        let turned = sorted(|d| d.off_rad.to_degrees());
+        let count = |holds: fn(&DriveRow) -> bool| all.iter().filter(|d| holds(d)).count();
+        let names =
+            [part_name(&first.set, first.level), kind_name(first.kind), first.method.clone()];
+        let numbers = [
+            all.len().to_string(),
+            format!("{:.1}", 100.0 * count(DriveRow::is_parked) as f64 / all.len() as f64),
+            count(|d| d.contact).to_string(),
+            format!("{:.1}", percentile(&off, 0.5)),
+            format!("{:.1}", percentile(&off, 1.0)),
+            format!("{:.2}", percentile(&turned, 1.0)),
+            format!("{:.1}", percentile(&beside, 0.5)),
+            format!("{:.1}", percentile(&beside, 1.0)),
+            format!("{:.1}", mean(|d| d.time_s)),
+            format!("{:.1}", mean(|d| d.standing_s)),
+        ];
+        lines.push(names.into_iter().chain(numbers).collect());
+    }
+    let headers = [
+        "level",
+        "type",
+        "method",
+        "driven",
+        "parked %",
+        "contacts",
+        "off cm",
+        "max off",
+        "max off °",
+        "beside cm",
+        "max beside",
+        "time s",
+        "standing s",
+    ];
+    Table {
+        title: "Driven: what became of the paths in a car with lags and errors".to_owned(),
+        headers: headers.map(str::to_owned).to_vec(),
+        rows: lines,
+        text_columns: 3,
+    }
+}
+
+/// The drives as CSV, in the order in which they were made.
+pub fn csv(drives: &[DriveRow]) -> String {
+    let mut text =
+        "scene,set,type,level,method,parked,off_m,off_rad,deviation_m,clearance_m,contact,time_s,\
+                    planned_time_s,standing_s\n"
+            .to_owned();
+    let quoted = |name: &str| match name.contains([',', '"', '\n', '\r']) {
+        true => format!("\"{}\"", name.replace('"', "\"\"")),
+        false => name.to_owned(),
+    };
+    for d in drives {
+        let kind = d.kind.map_or("", |kind| kind.name());
+        let level = d.level.map_or("", |level| level.name());
+        let clearance = d.clearance_m.map_or(String::new(), |c| c.to_string());
+        let _ = writeln!(
+            text,
+            "{},{},{kind},{level},{},{},{},{},{},{clearance},{},{},{},{}",
+            quoted(&d.scene),
+            quoted(&d.set),
+            quoted(&d.method),
+            d.is_parked(),
+            d.off_m,
+            d.off_rad,
+            d.deviation_m,
+            d.contact,
+            d.time_s,
+            d.planned_time_s,
+            d.standing_s
+        );
+    }
+    text
+}
