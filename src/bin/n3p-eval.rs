@@ -100,6 +100,10 @@ struct Driving {
     #[arg(long, value_name = "METRES", value_parser = noise, allow_negative_numbers = true)]
     #[arg(default_value_t = DriveConfig::default().obstacle_noise_m)]
     obstacle_noise: f64,
+    /// How much farther than the steering limit by which paths are planned the wheels turn, as a share of it.
+    #[arg(long, value_name = "SHARE", value_parser = share, allow_negative_numbers = true)]
+    #[arg(default_value_t = DriveConfig::default().steer_reserve)]
+    steer_reserve: f64,
     /// Time constant of the steering, seconds.
     #[arg(long, value_name = "SECONDS", value_parser = lag, allow_negative_numbers = true)]
     #[arg(default_value_t = DriveConfig::default().steering_lag_s)]
@@ -108,6 +112,10 @@ struct Driving {
 
 fn noise(text: &str) -> Result<f64, String> {
     cli::within(text, 0.0..=1.0, "metres")
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    cli::within(text, 0.0..=0.5, "of the limit")
 }
 
 fn lag(text: &str) -> Result<f64, String> {
@@ -120,6 +128,7 @@ impl Driving {
             position_noise_m: self.position_noise,
             obstacle_noise_m: self.obstacle_noise,
             steering_lag_s: self.steering_lag,
+            steer_reserve: self.steer_reserve,
             seed,
             ..DriveConfig::default()
         }

@@ -15,11 +15,13 @@ pub(super) struct Command {
 
 /// How the actuators follow: by first-order actuators, and the wheels no faster than the vehicle's steering rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Lags {
+pub(super) struct Actuators {
     /// Of the steering, seconds.
     pub steering: f64,
     /// Of the speed, seconds.
     pub speed: f64,
+    /// How much farther than the vehicle's steering limit the wheels turn, as a share of it.
+    pub reserve: f64,
 }
 
 /// Where the car is and what it does.
@@ -43,10 +45,16 @@ impl Car {
     }
 
     /// The motion of the next `dt` seconds, and the car after it.
-    pub fn step(&mut self, command: Command, lags: Lags, vehicle: &Vehicle, dt: f64) -> Segment {
+    pub fn step(
+        &mut self,
+        command: Command,
+        actuators: Actuators,
+        vehicle: &Vehicle,
+        dt: f64,
+    ) -> Segment {
         let (speed, steer) = (self.speed, self.steer);
         let most = vehicle.steer_rate * dt;
-        let lock = 1.05 * vehicle.max_steer;
+        let lock = (1.0 + actuators.reserve) * vehicle.max_steer;
         let wanted = command.steer.clamp(-lock, lock);
         self.steer += ((wanted - steer) * share(dt, actuators.steering)).clamp(-most, most);
         self.speed += (command.speed - speed) * share(dt, actuators.speed);

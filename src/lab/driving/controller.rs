@@ -7,7 +7,7 @@
 //! that of the trajectory and makes up for what the car is ahead or behind. C. Samson, "Control of chained
 //! systems: application to path following and time-varying point-stabilization of mobile robots", 1995.
 
-use super::car::{Command, Lags};
+use super::car::{Actuators, Command};
 use crate::curves::trajectory::Moment;
 use crate::curves::{Clothoid, SmoothPath, Trajectory};
 use crate::geometry::{Pose, signed_angle};
@@ -34,7 +34,7 @@ pub(super) struct Controller<'a> {
     trajectory: &'a Trajectory,
     /// Each leg of the path: where it begins, and how far along.
     legs: Vec<(f64, Pose, Clothoid)>,
-    lags: Lags,
+    actuators: Actuators,
     /// Where in the trajectory the car should be, seconds.
     clock: f64,
     /// The next of its halts, and how long the car has been late there.
@@ -47,7 +47,7 @@ impl<'a> Controller<'a> {
         vehicle: &'a Vehicle,
         path: &SmoothPath,
         trajectory: &'a Trajectory,
-        lags: Lags,
+        actuators: Actuators,
     ) -> Self {
         let mut along = 0.0;
         let legs = path.legs().map(|(from, motion)| {

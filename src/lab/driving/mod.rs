@@ -19,7 +19,7 @@ use crate::output::PathFile;
 use crate::rng::{Stream, rng};
 use crate::vehicle::Vehicle;
 use crate::world::{Level, ParkingType, Scene};
-use car::{Car, Lags};
+use car::{Actuators, Car};
 use controller::Controller;
 
 /// What a car that is driven has to put up with.
@@ -38,6 +38,9 @@ pub struct DriveConfig {
     pub speed_lag_s: f64,
     /// Share of the vehicle's steering rate that trajectories use; the rest is the controller's.
     pub steer_rate_share: f64,
+    /// How much farther than the vehicle's steering limit, by which paths are planned, the wheels turn, as a share
+    /// of it. Without that a car beside its path on full lock cannot come back to it.
+    pub steer_reserve: f64,
     /// Seed of all errors.
     pub seed: u64,
 }
@@ -51,6 +54,7 @@ impl Default for DriveConfig {
             steering_lag_s: 0.2,
             speed_lag_s: 0.2,
             steer_rate_share: 0.8,
+            steer_reserve: 0.05,
             seed: 1,
         }
     }
@@ -171,7 +175,11 @@ fn follow(
     config: &DriveConfig,
     noise: &mut impl Rng,
 ) -> Followed {
-    let actuators = Lags { steering: config.steering_lag_s, speed: config.speed_lag_s };
+    let actuators = Actuators {
+        steering: config.steering_lag_s,
+        speed: config.speed_lag_s,
+        reserve: config.steer_reserve,
+    };
     let mut controller = Controller::new(vehicle, path, trajectory, actuators);
     let mut car = Car::standing(path.start);
     let mut believed = car.pose;
