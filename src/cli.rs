@@ -15,8 +15,9 @@ use tracing_subscriber::filter::LevelFilter;
 use crate::curves::smoothing::StandstillSteering;
 use crate::files::reason;
 use crate::n3p::{Driver, more};
-use crate::planners::Problem;
 use crate::planners::goals::Terms;
+use crate::planners::{Problem, Shape};
+use crate::vehicle::Vehicle;
 
 /// Exit code of a planner that found no path.
 pub const EXIT_NO_PATH: u8 = 3;
@@ -93,6 +94,11 @@ pub fn contact(text: &str) -> Result<f64, String> {
     within(text, 0.0..=Problem::MAX_CONTACT, "metres")
 }
 
+/// Parses the metres of `--least-move` and `--last-straight`.
+pub fn shape(text: &str) -> Result<f64, String> {
+    within(text, 0.0..=Shape::MOST, "metres")
+}
+
 /// Runs a binary's body and maps its error to stderr and an exit code.
 pub fn run(body: impl FnOnce() -> anyhow::Result<ExitCode>) -> ExitCode {
     let level = std::env::var("N3P_LOG").ok().and_then(|level| level.parse().ok());
@@ -127,13 +133,32 @@ pub struct TermsArgs {
     /// "anywhere", for paths of arcs. Elsewhere the wheels turn no faster than the vehicle allows.
     #[arg(long, value_name = "never|at-changes|anywhere")]
     pub standstill_steering: Option<StandstillSteering>,
+    /// Let no move between changes of gear be shorter than so many metres, where there is room
+    /// [default: 0.3 for a usual car with --standstill-steering never or at-changes, else 0].
+    #[arg(long, value_name = "METRES", value_parser = shape, allow_negative_numbers = true)]
+    pub least_move: Option<f64>,
+    /// End paths with a straight of so many metres, where there is room and it takes no more than one more change
+    /// of gear [default: 0.5 for a usual car with --standstill-steering never or at-changes, else 0].
+    #[arg(long, value_name = "METRES", value_parser = shape, allow_negative_numbers = true)]
+    pub last_straight: Option<f64>,
 }
 
 impl TermsArgs {
     /// The terms; arcs, where nothing else is asked for.
     pub fn terms(&self) -> Terms {
         let standstill = self.standstill_steering.unwrap_or_default();
-        Terms { margin: self.margin, contact: self.allow_contact, standstill }
+        Terms { margin: self.margin, contact: self.allow_contact, standstill, shape: None }
+    }
+
+    /// The same with the shape that was asked for, the rest as is usual for `vehicle`.
+    pub fn shaped(&self, terms: Terms, vehicle: &Vehicle) -> Terms {
+        let Shape { least_move, last_straight } = terms.shape_for(vehicle);
+        let shape = Shape {
+            least_move: self.least_move.unwrap_or(least_move),
+            last_straight: self.last_straight.unwrap_or(last_straight),
+        };
+        let is_asked = self.least_move.is_some() || self.last_straight.is_some();
+        Terms { shape: is_asked.then_some(shape), ..terms }
     }
 }
 

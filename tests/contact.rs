@@ -23,8 +23,12 @@ use proptest::prelude::{ProptestConfig, any, prop_assert, prop_assert_eq, prop_a
 
 const BUDGET: Budget = Budget::new(20_000);
 const ALLOWED: f64 = 0.05;
-const TERMS: Terms =
-    Terms { margin: Problem::MARGIN, contact: ALLOWED, standstill: StandstillSteering::Anywhere };
+const TERMS: Terms = Terms {
+    margin: Problem::MARGIN,
+    contact: ALLOWED,
+    standstill: StandstillSteering::Anywhere,
+    shape: None,
+};
 const PILLAR: &str = "tests/fixtures/goals/beside-a-pillar.json";
 
 fn scene(index: u64) -> Scene {

@@ -44,7 +44,8 @@ fn case(scene: Scene) -> Case {
 
 /// Plans every scene with continuous steering; the oracle refuses none, and few have no such path.
 fn check(method: Method, scenes: Vec<Scene>, standstill: StandstillSteering, most_without: usize) {
-    let config = EpisodeConfig { terms: terms(standstill), repeats: 0, ..EpisodeConfig::new(BUDGET) };
+    let config =
+        EpisodeConfig { terms: terms(standstill), repeats: 0, ..EpisodeConfig::new(BUDGET) };
     let mut without = Vec::new();
     for scene in scenes {
         let name = scene.name.clone();
@@ -86,9 +87,15 @@ fn at_home_every_path_is_continuous_and_the_oracle_agrees() {
 #[test]
 fn in_lots_and_clutter_too_with_vehicles_of_any_size() {
     let kinds = [ParkingType::Forward, ParkingType::Parallel, ParkingType::Reverse];
-    let lots = kinds.into_iter().flat_map(|k| (0..6).map(move |i| lot(&Vehicle::default(), k, 3, i)));
+    let lots =
+        kinds.into_iter().flat_map(|k| (0..6).map(move |i| lot(&Vehicle::default(), k, 3, i)));
     check(Method::N3P, lots.collect(), StandstillSteering::AtChanges, 1);
-    check(Method::HA_RS, (0..40).map(|i| clutter(8, i)).collect(), StandstillSteering::AtChanges, 4);
+    check(
+        Method::HA_RS,
+        (0..40).map(|i| clutter(8, i)).collect(),
+        StandstillSteering::AtChanges,
+        4,
+    );
 }
 
 /// Any motions with continuous curvature between changes of gear, of a vehicle of any size.
@@ -97,24 +104,26 @@ fn smooth_paths() -> impl Strategy<Value = (SmoothPath, Vehicle)> {
     let part = (-lock..lock, 0.05..4.0, 0.0..2.0, any::<bool>());
     let start = (-9.0..9.0, -9.0..9.0, -3.0..3.0).prop_map(|(x, y, h)| Pose::new(x, y, h));
     let size = prop_oneof![Just(1.0), 0.05..4.0];
-    (start, prop::collection::vec(part, 1..7), size).prop_map(|(start, parts, size): (Pose, _, f64)| {
-        let (mut from, mut motions) = (0.0, Vec::new());
-        let v = Vehicle::default();
-        for (to, ramp, arc, backward) in parts {
-            let sign = if backward { -size } else { size };
-            motions.push(Clothoid { from: from / size, to: to / size, length: sign * ramp });
-            motions.push(Clothoid { from: to / size, to: to / size, length: sign * arc });
-            from = to;
-        }
-        let vehicle = Vehicle {
-            length: v.length * size,
-            width: v.width * size,
-            wheelbase: v.wheelbase * size,
-            rear_overhang: v.rear_overhang * size,
-            ..v
-        };
-        (SmoothPath { start, motions }, vehicle)
-    })
+    (start, prop::collection::vec(part, 1..7), size).prop_map(
+        |(start, parts, size): (Pose, _, f64)| {
+            let (mut from, mut motions) = (0.0, Vec::new());
+            let v = Vehicle::default();
+            for (to, ramp, arc, backward) in parts {
+                let sign = if backward { -size } else { size };
+                motions.push(Clothoid { from: from / size, to: to / size, length: sign * ramp });
+                motions.push(Clothoid { from: to / size, to: to / size, length: sign * arc });
+                from = to;
+            }
+            let vehicle = Vehicle {
+                length: v.length * size,
+                width: v.width * size,
+                wheelbase: v.wheelbase * size,
+                rear_overhang: v.rear_overhang * size,
+                ..v
+            };
+            (SmoothPath { start, motions }, vehicle)
+        },
+    )
 }
 
 /// Footprint corners in the world.
@@ -182,8 +191,8 @@ fn integrates(
     };
     for pair in moments.windows(2) {
         let dt = pair[1].time - pair[0].time;
-        let [begin, middle, end] = [0.0, 0.5, 1.0 - 1e-9]
-            .map(|part| trajectory.at(pair[0].time + part * dt));
+        let [begin, middle, end] =
+            [0.0, 0.5, 1.0 - 1e-9].map(|part| trajectory.at(pair[0].time + part * dt));
         let k1 = rate(&begin, state.heading);
         let k2 = rate(&middle, state.heading + k1[2] * dt / 2.0);
         let k3 = rate(&middle, state.heading + k2[2] * dt / 2.0);
@@ -198,7 +207,10 @@ fn integrates(
         prop_assert!(sideways <= limits.lateral_acceleration * allowed, "{m:?}");
         let turned = (pair[1].steer - m.steer).abs();
         let jumps = m.speed == 0.0 || pair[1].speed == 0.0 || m.gear != pair[1].gear;
-        prop_assert!(jumps || turned <= limits.steer_rate * dt * allowed + 1e-9, "{m:?} {turned} {dt}");
+        prop_assert!(
+            jumps || turned <= limits.steer_rate * dt * allowed + 1e-9,
+            "{m:?} {turned} {dt}"
+        );
         prop_assert!(m.steer.abs() <= vehicle.max_steer * allowed, "{m:?}");
     }
     let end = path.end();
@@ -228,8 +240,12 @@ fn smoothed_curves_end_where_they_did() {
         let path = Path::new(from, word.segments().iter().copied());
         let sharpness = [8.0 / (radius * radius), 30.0 / (radius * radius)];
         for turned_at_changes in [true, false] {
-            let smoothing =
-                Smoothing { turned_at_start: false, turned_at_changes, sharpness: &sharpness };
+            let smoothing = Smoothing {
+                turned_at_start: false,
+                turned_at_changes,
+                sharpness: &sharpness,
+                last_straight: 0.0,
+            };
             all += 1;
             let Some(smoothed) = smooth(&path, to, &smoothing) else { continue };
             fitted += 1;
@@ -250,7 +266,12 @@ fn smoothed_curves_end_where_they_did() {
 #[test]
 fn straight_ahead_is_driven_as_it_is() {
     let path = Path::new(Pose::new(1.0, 2.0, 0.5), [Segment::straight(7.0)]);
-    let smoothing = Smoothing { turned_at_start: false, turned_at_changes: true, sharpness: &[0.2] };
+    let smoothing = Smoothing {
+        turned_at_start: false,
+        turned_at_changes: true,
+        sharpness: &[0.2],
+        last_straight: 0.0,
+    };
     assert_eq!(smooth(&path, path.end(), &smoothing), Some(SmoothPath::of(&path)));
     let nothing = Path::new(Pose::default(), []);
     assert_eq!(smooth(&nothing, nothing.end(), &smoothing), Some(SmoothPath::of(&nothing)));
@@ -318,7 +339,8 @@ fn the_command_line_asks_for_it_and_trajectories_have_it_by_default() {
     for asked in ["never", "at-changes"] {
         plan(dir.path(), &["--out", "p.json", "--standstill-steering", asked]).assert().success();
         let path = json(&file("p.json"));
-        let column = |name: &str| -> Vec<f64> { serde_json::from_value(path[name].clone()).unwrap() };
+        let column =
+            |name: &str| -> Vec<f64> { serde_json::from_value(path[name].clone()).unwrap() };
         let (from, to, gears) = (column("steer_from"), column("steer_to"), column("gears"));
         assert_eq!(from.len(), path["poses"].as_array().unwrap().len());
         for i in 1..from.len() {

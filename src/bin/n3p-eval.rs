@@ -161,7 +161,9 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
         },
         settings: MethodSettings::default(),
         budget: Budget { max_expansions: args.max_expansions, effort: args.effort },
-        terms: args.terms.terms(),
+        terms: args
+            .terms
+            .shaped(args.terms.terms(), &vehicle.or(models.vehicle()).unwrap_or_default()),
         threads: args.threads.into(),
     };
     if args.policy.is_given() && !config.methods.contains(&Method::POLICY) {

@@ -1,6 +1,6 @@
 //! One method whose models were trained for several vehicles.
 
-use crate::planners::{Budget, NoPath, PlanResult, Planner, Problem};
+use crate::planners::{Budget, HybridAStarConfig, NoPath, PlanResult, Planner, Problem};
 use crate::vehicle::Vehicle;
 
 type Boxed = Box<dyn Planner + Send>;
@@ -28,6 +28,10 @@ impl ByVehicle {
 impl Planner for ByVehicle {
     fn name(&self) -> &str {
         self.planners[0].1.name()
+    }
+
+    fn config(&self) -> HybridAStarConfig {
+        self.planners[0].1.config()
     }
 
     fn plan(&mut self, problem: &Problem, budget: Budget) -> PlanResult {

@@ -424,6 +424,10 @@ impl Planner for GuidedPlanner {
         &self.name
     }
 
+    fn config(&self) -> HybridAStarConfig {
+        *self.hars.config()
+    }
+
     fn plan(&mut self, problem: &Problem, budget: Budget) -> PlanResult {
         let mut left = budget.max_expansions;
         let planned = match self.strategy {

@@ -6,7 +6,6 @@
 //! every path. [`plan`] finds paths that keep it with any planner: one arc out of the contact, and
 //! an ordinary problem from where it ends.
 
-use super::cost::CostModel;
 use super::problem::Terms;
 use super::{Budget, PlanResult, Planner, Problem};
 use crate::curves::{Path, Segment, reeds_shepp};
@@ -216,7 +215,7 @@ fn is_clear_between(one: &CollisionWorld, path: &Path, from: f64, to: f64) -> bo
 pub(super) fn plan(planner: &mut dyn Planner, problem: &Problem, budget: Budget) -> PlanResult {
     let Some(contact) = &problem.contact else { return planner.plan(problem, budget) };
     let vehicle = &problem.vehicle;
-    let model = CostModel::default().scaled(vehicle.scale());
+    let model = planner.config().cost.scaled(vehicle.scale());
     let cost = |segments: &[Segment]| model.path(vehicle, segments);
     let mut best = planner.plan(problem, budget);
     let mut expansions = best.expansions;

@@ -5,7 +5,9 @@
 //! does not fit, a search looks for other paths that do: a path counts there only if it is free once it is smooth.
 
 use super::hybrid_astar::HybridAStar;
-use super::{Budget, HybridAStarConfig, NoPath, PlanResult, Problem, Route, keeps_limits};
+use super::problem::Terms;
+use super::shape::{Shape, ended_straight, lengthened};
+use super::{Budget, Guidance, NoPath, PlanResult, Planner, Problem, Route, keeps_limits};
 use crate::curves::smoothing::{Smoothing, StandstillSteering, smooth};
 use crate::curves::{Path, SmoothPath};
 use crate::vehicle::Vehicle;
@@ -14,6 +16,8 @@ use crate::vehicle::Vehicle;
 /// next half as much, and the last at least so much. At 1 m/s, 0.5 m/s … the wheels of a usual car turn that fast.
 const GENTLEST: f64 = 0.25;
 const SHARPEST: f64 = 0.0075;
+/// Fits for a path that ends straight.
+const WISHES: usize = 4;
 /// Expansions for a path that is free once it is smooth, and paths that are looked at.
 const EXPANSIONS: usize = 20_000;
 const PATHS: usize = 400;
@@ -26,15 +30,22 @@ fn sharpnesses(vehicle: &Vehicle) -> Vec<f64> {
     lengths.map(move |share| curvature * curvature / share).collect()
 }
 
-/// `path` with clothoids, if it can be driven so, with straight wheels at the start if possible.
-pub(super) fn smoothed(
-    problem: &Problem,
-    path: &Path,
+/// How a path is to be driven.
+#[derive(Clone, Copy, Debug)]
+struct Wanted {
     standstill: StandstillSteering,
-) -> Option<SmoothPath> {
-    let turned_at_changes = standstill == StandstillSteering::AtChanges;
-    let starts: &[bool] = if turned_at_changes { &[false, true] } else { &[false] };
-    starts.iter().find_map(|&at_start| smoothed_from(problem, path, at_start, turned_at_changes))
+    last_straight: f64,
+}
+
+/// `path` with clothoids, if it can be driven so, with straight wheels at the start if possible.
+fn smoothed(problem: &Problem, path: &Path, wanted: Wanted) -> Option<SmoothPath> {
+    let starts: &[bool] = match wanted.standstill {
+        StandstillSteering::Never => &[false],
+        StandstillSteering::AtChanges => &[false, true],
+        // Wheels that turn anywhere need no clothoids.
+        StandstillSteering::Anywhere => &[true],
+    };
+    starts.iter().find_map(|&at_start| smoothed_from(problem, path, at_start, wanted))
 }
 
 /// [`smoothed`] with every clothoid as gentle as may be: the runs on which the car would touch something
@@ -43,17 +54,26 @@ fn smoothed_from(
     problem: &Problem,
     path: &Path,
     turned_at_start: bool,
-    turned_at_changes: bool,
+    wanted: Wanted,
 ) -> Option<SmoothPath> {
-    let (goal, choice) = (path.end(), sharpnesses(&problem.vehicle));
+    let Wanted { standstill, last_straight } = wanted;
+    let choice = match standstill {
+        StandstillSteering::Anywhere => vec![f64::INFINITY],
+        _ => sharpnesses(&problem.vehicle),
+    };
+    let turned_at_changes = standstill != StandstillSteering::Never;
+    let goal = path.end();
     let mut steps = vec![0; path.direction_changes() + 1];
     let mut sharpness = Vec::with_capacity(steps.len());
-    loop {
+    // Each run could be tried with each; what is only a wish is given up sooner.
+    let tries = if last_straight > 0.0 { WISHES } else { usize::MAX };
+    for _ in 0..tries {
         sharpness.clear();
         sharpness.extend(steps.iter().map(|&step: &usize| choice[step]));
-        let smoothing = Smoothing { turned_at_start, turned_at_changes, sharpness: &sharpness };
+        let sharpness = &sharpness;
+        let smoothing = Smoothing { turned_at_start, turned_at_changes, sharpness, last_straight };
         let smooth = smooth(path, goal, &smoothing);
-        let touching = match smooth.map(|smooth| checked(problem, smooth)) {
+        let touching = match smooth.map(|smooth| checked(problem, smooth, standstill)) {
             Some(Ok(smooth)) => return Some(smooth),
             Some(Err(touching)) => touching,
             None => None,
@@ -65,6 +85,7 @@ fn smoothed_from(
             None => steps.iter_mut().for_each(|step| *step = (*step + 1).min(sharpest)),
         }
     }
+    None
 }
 
 /// How far the car may come from where the exact check sees it, metres: half of the margin, if there is one,
@@ -79,7 +100,11 @@ pub(super) fn deviation(problem: &Problem) -> f64 {
 /// The certificate of a smooth path: it begins at the start, keeps the steering limit and the bounds, and
 /// touches nothing: arcs that it is nowhere farther from than [`deviation`] keep the margin. Where it touches
 /// something, the first run on which it does is known.
-fn checked(problem: &Problem, path: SmoothPath) -> Result<SmoothPath, Option<usize>> {
+fn checked(
+    problem: &Problem,
+    path: SmoothPath,
+    standstill: StandstillSteering,
+) -> Result<SmoothPath, Option<usize>> {
     let arcs = path.arcs(deviation(problem), &problem.vehicle);
     let mut run = 0;
     let mut gear = arcs.segments.first().map(|s| s.gear());
@@ -91,44 +116,69 @@ fn checked(problem: &Problem, path: SmoothPath) -> Result<SmoothPath, Option<usi
             return Err(Some(run));
         }
     }
-    let is_kept = path.jumps() == 0
+    let may_jump = standstill == StandstillSteering::Anywhere;
+    let is_kept = (may_jump || path.jumps() == 0)
         && problem.collision.pose_is_free(path.start)
         && keeps_limits(problem, &arcs)
         && problem.collision.stays_within_bounds(&path);
     if is_kept { Ok(path) } else { Err(None) }
 }
 
-/// A planner's result with its path made smooth, as `standstill` asks for.
+/// A planner's result with its moves as long, its end as straight and its path as smooth as `terms` ask for, if
+/// it can be driven so; what is asked of its shape only where there is room for it.
+fn shaped(problem: &Problem, result: &PlanResult, terms: &Terms) -> Option<PlanResult> {
+    let path = result.outcome.as_ref().ok()?;
+    let Shape { least_move, last_straight } = terms.shape_for(&problem.vehicle);
+    let standstill = terms.standstill;
+    let any_end = Wanted { standstill, last_straight: 0.0 };
+    // Who stops anywhere near the goal has no end to be straight, and who is there already stays.
+    let is_free_to_shape = result.covered.is_none() && path.length() > last_straight;
+    let longer = lengthened(problem, path, if is_free_to_shape { least_move } else { 0.0 });
+    let mut ways = vec![(&longer, any_end)];
+    if is_free_to_shape && last_straight > ended_straight(path) {
+        ways.insert(0, (&longer, Wanted { standstill, last_straight }));
+    }
+    if longer != *path {
+        ways.push((path, any_end));
+    }
+    let smooth = ways.into_iter().find_map(|(path, wanted)| smoothed(problem, path, wanted))?;
+    if standstill != StandstillSteering::Anywhere {
+        return Some(with_smooth(problem, result.clone(), smooth));
+    }
+    let arcs = smooth.arcs(deviation(problem), &problem.vehicle);
+    Some(PlanResult { outcome: Ok(arcs), ..result.clone() })
+}
+
+/// A planner's result as `terms` ask for it; where its path cannot be driven so, another that can.
 pub(super) fn driven(
+    planner: &dyn Planner,
     problem: &Problem,
     result: PlanResult,
-    standstill: StandstillSteering,
+    terms: &Terms,
     budget: Budget,
 ) -> PlanResult {
-    let Ok(path) = &result.outcome else { return result };
-    if standstill == StandstillSteering::Anywhere {
+    if result.outcome.is_err() || terms.are_usual() {
         return result;
     }
-    if let Some(smooth) = smoothed(problem, path, standstill) {
-        return with_smooth(problem, result, smooth);
+    if let Some(shaped) = shaped(problem, &result, terms) {
+        return shaped;
     }
     // Another path may be one that is free when it is smooth.
+    let standstill = terms.standstill;
     let share = budget.max_expansions.saturating_sub(result.expansions).min(EXPANSIONS);
     let (mut spend, mut looks, mut found) = (share, PATHS, None);
     if result.covered.is_none() {
-        let mut search = HybridAStar::new(HybridAStarConfig::default());
-        search.first_accepted(problem, &mut spend, |path| {
+        HybridAStar::new(planner.config()).first_accepted(problem, &mut spend, |path| {
             looks -= 1;
-            found = smoothed(problem, path, standstill);
+            found = smoothed(problem, path, Wanted { standstill, last_straight: 0.0 });
             found.is_some() || looks == 0
         });
     }
     let expansions = result.expansions + share - spend;
     let Some(smooth) = found else { return PlanResult::none(NoPath::NotSmooth, expansions) };
-    let guidance = result.guidance.map(|g| super::Guidance {
-        preparatory: None,
-        route: if spend < share { Route::Searched } else { g.route },
-    });
+    let route = if spend < share { Some(Route::Searched) } else { None };
+    let guidance =
+        result.guidance.map(|g| Guidance { preparatory: None, route: route.unwrap_or(g.route) });
     with_smooth(problem, PlanResult { expansions, guidance, ..result }, smooth)
 }
 

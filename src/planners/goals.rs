@@ -44,7 +44,7 @@ pub enum PassedOver {
 pub fn first_problem(scene: &Scene, terms: Terms) -> Result<Problem, ProblemError> {
     let mut errors = Vec::new();
     for index in 0..scene.all_goals().len() {
-        let goal = Goal::new(scene, index, terms);
+        let goal = Goal::new(scene, index, terms, CostModel::default());
         let exact = goal.exact()?;
         match exact.or_else(|error| goal.beside().find_map(|p| p.map(Ok)).unwrap_or(Err(error))) {
             Ok(problem) => return Ok(problem),
@@ -74,8 +74,8 @@ struct Goal<'a> {
 }
 
 impl<'a> Goal<'a> {
-    fn new(scene: &'a Scene, index: usize, terms: Terms) -> Self {
-        let model = CostModel::default().scaled(scene.vehicle.scale());
+    fn new(scene: &'a Scene, index: usize, terms: Terms, cost: CostModel) -> Self {
+        let model = cost.scaled(scene.vehicle.scale());
         Self { scene, index, pose: scene.all_goals()[index], terms, model }
     }
 
@@ -157,20 +157,20 @@ impl<'a> Goal<'a> {
         planner: &mut dyn Planner,
         budget: Budget,
     ) -> Result<Result<Found, ProblemError>, ProblemError> {
-        let found = |problem: Problem, result: PlanResult| {
+        let found = |planner: &mut dyn Planner, problem: Problem, result: PlanResult| {
             let result = ended_early(&problem, result);
-            let result = continuous::driven(&problem, result, self.terms.standstill, budget);
+            let result = continuous::driven(planner, &problem, result, &self.terms, budget);
             let path = result.outcome.as_ref();
             let cost = |path: &Path| self.model.path(&problem.vehicle, &path.segments);
             let cost = path.map_or(f64::INFINITY, cost);
             Found { index: self.index, problem, result, cost }
         };
         if let Some((problem, stays)) = self.stay() {
-            return Ok(Ok(found(problem, stays)));
+            return Ok(Ok(found(planner, problem, stays)));
         }
         let exact = self.exact()?.map(|problem| {
             let result = contact::plan(planner, &problem, budget);
-            found(problem, result)
+            found(planner, problem, result)
         });
         let mut expansions = exact.as_ref().map_or(0, |b| b.result.expansions);
         let mut best = exact;
@@ -185,7 +185,7 @@ impl<'a> Goal<'a> {
                 contact::plan(planner, &problem, Budget { max_expansions: left, ..budget });
             expansions += result.expansions;
             left = left.saturating_sub(result.expansions);
-            let other = found(problem, result);
+            let other = found(planner, problem, result);
             if best.as_ref().is_ok_and(|b| b.rank() <= other.rank()) {
                 continue;
             }
@@ -229,7 +229,8 @@ pub fn plan(
     budget: Budget,
 ) -> Result<Planned, ProblemError> {
     scene.check_numbers()?;
-    let goals = (0..scene.all_goals().len()).map(|index| Goal::new(scene, index, terms));
+    let cost = planner.config().cost;
+    let goals = (0..scene.all_goals().len()).map(|index| Goal::new(scene, index, terms, cost));
     let mut goals: Vec<(f64, Goal)> = goals.map(|goal| (goal.least_cost(), goal)).collect();
     // The nearest first: what they cost leaves out most of the others. Sorting is stable.
     goals.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -446,6 +446,10 @@ impl Planner for HybridAStar {
         if self.solutions == 1 { "ha-rs" } else { "ha-hold" }
     }
 
+    fn config(&self) -> HybridAStarConfig {
+        self.config
+    }
+
     fn plan(&mut self, problem: &Problem, budget: Budget) -> PlanResult {
         let goal = self.goal_set(problem);
         let mut left = budget.max_expansions;

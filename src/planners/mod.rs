@@ -31,6 +31,7 @@ mod plain;
 mod problem;
 mod scenario;
 mod search;
+mod shape;
 mod shortcut;
 
 pub use analytic::AnalyticTail;
@@ -42,6 +43,7 @@ pub use multi_heuristic::{MultiHeuristicConfig, MultiHeuristicHybridAStar};
 pub use plain::PlainHybridAStar;
 pub use problem::{Conflict, Problem, ProblemError};
 pub use scenario::ScenarioHybridAStar;
+pub use shape::Shape;
 
 use crate::curves::{Path, SmoothPath};
 use crate::geometry::Pose;
@@ -51,6 +53,11 @@ use crate::geometry::Pose;
 pub trait Planner {
     /// The method name of tables and files, such as `ha-rs`.
     fn name(&self) -> &str;
+
+    /// The settings of its searches: by their costs its paths are compared with others.
+    fn config(&self) -> HybridAStarConfig {
+        HybridAStarConfig::default()
+    }
 
     /// Plans one problem. "No path" is a result, not an error.
     fn plan(&mut self, problem: &Problem, budget: Budget) -> PlanResult;

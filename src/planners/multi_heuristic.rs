@@ -121,6 +121,10 @@ impl Planner for MultiHeuristicHybridAStar {
         "mhha"
     }
 
+    fn config(&self) -> HybridAStarConfig {
+        *self.search.config()
+    }
+
     fn plan(&mut self, problem: &Problem, budget: Budget) -> PlanResult {
         self.search.plan(problem, budget)
     }

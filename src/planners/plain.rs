@@ -61,6 +61,10 @@ impl Planner for PlainHybridAStar {
         "ha"
     }
 
+    fn config(&self) -> HybridAStarConfig {
+        self.config
+    }
+
     fn plan(&mut self, problem: &Problem, budget: Budget) -> PlanResult {
         let config = match self.config.for_search(&problem.vehicle) {
             Ok(config) => config,

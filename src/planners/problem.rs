@@ -1,5 +1,6 @@
 //! A problem: a scene in planning coordinates, indexed and checked.
 
+use super::Shape;
 use super::contact::{Contact, depth_into};
 use crate::curves::smoothing::StandstillSteering;
 use crate::geometry::{Aabb, Frame, Pose, Vec2};
@@ -49,9 +50,26 @@ pub struct Terms {
     pub contact: f64,
     /// Where the steering wheel may be turned while the car stands.
     pub standstill: StandstillSteering,
+    /// The shape of paths; without it what is usual: nothing for arcs, [`Shape::usual`] for paths that are to
+    /// be followed.
+    pub shape: Option<Shape>,
 }
 
 impl Terms {
+    /// Whether paths are taken as planners make them: arcs and straights of any shape.
+    pub(super) fn are_usual(&self) -> bool {
+        self.standstill == StandstillSteering::Anywhere && self.shape.is_none()
+    }
+
+    /// What is asked of the shape of a path.
+    pub fn shape_for(&self, vehicle: &Vehicle) -> Shape {
+        let usual = match self.standstill {
+            StandstillSteering::Anywhere => Shape::default(),
+            _ => Shape::usual(vehicle),
+        };
+        self.shape.unwrap_or(usual)
+    }
+
     /// Checks both numbers.
     pub fn check(self) -> Result<(), ProblemError> {
         if !(0.0..=Problem::MAX_MARGIN).contains(&self.margin) {
@@ -68,7 +86,7 @@ impl Default for Terms {
     /// The usual margin, no contact, and arcs.
     fn default() -> Self {
         let standstill = StandstillSteering::Anywhere;
-        Self { margin: Problem::MARGIN, contact: 0.0, standstill }
+        Self { margin: Problem::MARGIN, contact: 0.0, standstill, shape: None }
     }
 }
 

@@ -55,6 +55,10 @@ impl Planner for ScenarioHybridAStar {
         "sha"
     }
 
+    fn config(&self) -> HybridAStarConfig {
+        *self.search.config()
+    }
+
     fn plan(&mut self, problem: &Problem, budget: Budget) -> PlanResult {
         if problem.kind != Some(ParkingType::Parallel) {
             return PlanResult::none(NoPath::NotApplicable, 0);

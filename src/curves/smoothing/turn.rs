@@ -16,6 +16,8 @@ pub(super) struct Piece {
     pub ends: [Option<f64>; 2],
     /// |Change of curvature| per metre on the clothoids, 1/m².
     pub sharpness: f64,
+    /// The least length of a straight, metres.
+    pub floor: f64,
     /// The unknown.
     pub value: f64,
 }
@@ -49,7 +51,7 @@ impl Piece {
     /// The least `value` there can be.
     pub fn least(&self) -> f64 {
         if self.is_straight() {
-            return 0.0;
+            return self.floor;
         }
         let least = self.ends.iter().flatten().fold(0.0_f64, |a, &b| a.max(b));
         self.turned_by_clothoids(least)
@@ -123,7 +125,8 @@ mod tests {
         {
             for (gear, curvature) in [(1.0, 0.25), (-1.0, 0.25), (1.0, -0.25), (-1.0, -0.25)] {
                 for more in [0.02, 0.1, 0.7, 2.0] {
-                    let piece = Piece { gear, curvature, ends, sharpness: 0.3, value: 0.0 };
+                    let piece =
+                        Piece { gear, curvature, ends, sharpness: 0.3, floor: 0.0, value: 0.0 };
                     let piece = Piece { value: piece.least() + more, ..piece };
                     let (way, change) = piece.way();
                     let sign = gear * curvature.signum();
