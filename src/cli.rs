@@ -14,9 +14,10 @@ use tracing_subscriber::filter::LevelFilter;
 
 use crate::curves::smoothing::StandstillSteering;
 use crate::files::reason;
-use crate::n3p::{Driver, more};
+use crate::n3p::{Driver, MethodSettings, more};
+use crate::planners::cost::CostModel;
 use crate::planners::goals::Terms;
-use crate::planners::{Problem, Shape};
+use crate::planners::{HybridAStarConfig, Problem, Shape};
 use crate::vehicle::Vehicle;
 
 /// Exit code of a planner that found no path.
@@ -159,6 +160,35 @@ impl TermsArgs {
         };
         let is_asked = self.least_move.is_some() || self.last_straight.is_some();
         Terms { shape: is_asked.then_some(shape), ..terms }
+    }
+}
+
+/// What plans prefer.
+#[derive(clap::Args)]
+pub struct CostArgs {
+    /// A weight of the costs by which plans are chosen, such as gear_change=6; may be given several times. Per metre
+    /// "forward" (1), "backward" (1.2), "clearance" (0.4, nearer to obstacles than "near", 0.2 m); per change "gear_change"
+    /// (3, in metres for a usual car); per radian "steer" (0.05, and metre) and "steer_change" (0.2).
+    #[arg(long = "cost", value_name = "WEIGHT=NUMBER")]
+    weights: Vec<String>,
+}
+
+impl CostArgs {
+    /// The usual settings of methods with these weights.
+    pub fn settings(&self) -> anyhow::Result<MethodSettings> {
+        let usual = MethodSettings::default();
+        let mut cost = serde_json::to_value(usual.planner.cost)?;
+        for weight in &self.weights {
+            let wrong = || BadInput(format!("--cost {weight}: expected WEIGHT=NUMBER"));
+            let (name, number) = weight.split_once('=').ok_or_else(wrong)?;
+            let number: f64 = number.trim().parse().map_err(|_| wrong())?;
+            cost[name.trim()] = serde_json::json!(number);
+        }
+        let bad = |e: &dyn Display| BadInput(format!("--cost: {e}"));
+        let cost: CostModel = serde_json::from_value(cost).map_err(|e| bad(&e))?;
+        cost.validate().map_err(|e| bad(&e))?;
+        let planner = HybridAStarConfig { cost, ..usual.planner };
+        Ok(MethodSettings { planner, ..usual })
     }
 }
 

@@ -12,8 +12,9 @@ use crate::curves::{Path, SmoothPath, TrajectoryLimits};
 use crate::geometry::{Frame, Pose};
 use crate::n3p::{Method, MethodError, MethodSettings, Models, ModelsError};
 use crate::output::{Driven, PathFile};
+use crate::planners::cost::CostModel;
 use crate::planners::goals::{self, Terms};
-use crate::planners::{Budget, NoPath, Planner, ProblemError, Route};
+use crate::planners::{Budget, HybridAStarConfig, NoPath, Planner, ProblemError, Route, Shape};
 use crate::vehicle::{Vehicle, VehicleError};
 use crate::world::{GoalTolerance, ParkingType, Scene};
 
@@ -63,9 +64,12 @@ pub enum ParkerError {
     /// The method cannot be built.
     #[error(transparent)]
     Method(#[from] MethodError),
-    /// A margin or a contact beyond what can be asked for.
+    /// A margin, a contact or a length beyond what can be asked for.
     #[error("{0}")]
     Terms(ProblemError),
+    /// A weight of the costs that is none.
+    #[error("{0}")]
+    Cost(String),
 }
 
 /// Why there is no plan.
@@ -134,6 +138,22 @@ impl Parker {
     fn checked(self) -> Result<Self, ParkerError> {
         self.terms.check().map_err(ParkerError::Terms)?;
         Ok(self)
+    }
+
+    /// The same with other lengths asked of moves and of the straight at the end; else those are that are usual:
+    /// see [`Terms::shape`].
+    pub fn shape(self, shape: Shape) -> Result<Self, ParkerError> {
+        Self { terms: Terms { shape: Some(shape), ..self.terms }, ..self }.checked()
+    }
+
+    /// The same by other costs: what a plan prefers, such as fewer changes of gear to a short way.
+    pub fn cost(self, cost: CostModel) -> Result<Self, ParkerError> {
+        cost.validate().map_err(ParkerError::Cost)?;
+        let planner = HybridAStarConfig { cost, ..self.settings.planner };
+        let settings = MethodSettings { planner, ..self.settings };
+        // Planners of before would plan by the costs of before.
+        let idle = Mutex::new(vec![self.method.build(&self.models, &settings)?]);
+        Ok(Self { settings, idle, ..self })
     }
 
     /// The same with another budget of work.
@@ -393,6 +413,11 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// The vehicle it was planned for.
+    pub fn vehicle(&self) -> &Vehicle {
+        &self.vehicle
+    }
+
     /// Driven length, metres.
     pub fn length(&self) -> f64 {
         self.path.length()

@@ -14,7 +14,7 @@ use n3p::lab::driving::{DriveConfig, drive};
 use n3p::lab::evaluation::oracle;
 use n3p::n3p::{Method, MethodSettings, Models};
 use n3p::planners::goals::{self, Terms};
-use n3p::planners::{Budget, NoPath};
+use n3p::planners::{Budget, NoPath, Shape};
 use n3p::rng::{Stream, rng};
 use n3p::vehicle::Vehicle;
 use n3p::world::clutter::clutter;
@@ -317,6 +317,62 @@ fn goals_with_a_tolerance_are_reached_smoothly_too() {
     let planned = goals::plan(planner.as_mut(), &scene, terms, BUDGET).unwrap();
     let path = planned.result.smooth.unwrap();
     assert!(planned.problem.is_arrival(path.end()));
+}
+
+/// Moves between changes of gear, metres.
+fn moves(path: &SmoothPath) -> Vec<f64> {
+    let runs = path.motions.chunk_by(|a, b| a.gear() == b.gear());
+    runs.map(|run| run.iter().map(|m| m.length.abs()).sum()).collect()
+}
+
+/// Where there is room, moves are as long and ends as straight as was asked for; where there is none, there
+/// is still a path.
+#[test]
+fn moves_are_long_and_ends_are_straight_where_there_is_room() {
+    let models = Models::usual(&[Method::N3P], Some(&Vehicle::default())).unwrap();
+    let mut planner = Method::N3P.build(&models, &MethodSettings::default()).unwrap();
+    let mut counts = [[0; 3]; 2];
+    for scene in home(8) {
+        for (i, shape) in [Some(Shape::default()), None].into_iter().enumerate() {
+            let terms = Terms { shape, ..terms(StandstillSteering::AtChanges) };
+            let planned = goals::plan(planner.as_mut(), &scene, terms, BUDGET).unwrap();
+            let Some(path) = planned.result.smooth else { continue };
+            let last = path.motions.last().unwrap();
+            let straight = if last.from == 0.0 && last.to == 0.0 { last.length.abs() } else { 0.0 };
+            counts[i][0] += 1;
+            counts[i][1] += usize::from(moves(&path).iter().any(|&m| m < 0.28));
+            counts[i][2] += usize::from(straight >= 0.5 - 1e-9);
+        }
+    }
+    let [[all, short, straight], [all_shaped, short_shaped, straight_shaped]] = counts;
+    assert!(all >= 95 && all_shaped == all, "{counts:?}");
+    assert!(short_shaped * 2 <= short, "{counts:?}");
+    assert!(straight_shaped > 3 * straight && straight_shaped * 2 > all, "{counts:?}");
+}
+
+#[test]
+fn preferences_are_kept_in_the_one_model_of_costs() {
+    let dir = tempfile::tempdir().unwrap();
+    let changes = |weight: &str| {
+        let out = plan(dir.path(), &["--method", "ha-rs", "--json", "--cost", weight]).assert();
+        let json: serde_json::Value = serde_json::from_slice(&out.get_output().stdout).unwrap();
+        json["row"]["direction_changes"].as_u64().unwrap()
+    };
+    assert!(changes("gear_change=30") <= changes("gear_change=0"));
+    for (weight, why) in [
+        ("gear_change", "WEIGHT=NUMBER"),
+        ("gear_change=x", "WEIGHT=NUMBER"),
+        ("gears=1", "unknown field `gears`"),
+        ("gear_change=-1", "cost.gear_change is -1"),
+        ("gear_change=NaN", "--cost"),
+    ] {
+        plan(dir.path(), &["--cost", weight]).assert().code(2).stderr(contains(why));
+    }
+    for length in ["-1", "NaN", "9"] {
+        for flag in ["--least-move", "--last-straight"] {
+            plan(dir.path(), &[flag, length]).assert().code(2).stderr(contains("0 and 5 metres"));
+        }
+    }
 }
 
 fn plan(dir: &FilePath, args: &[&str]) -> Command {

@@ -50,6 +50,7 @@ pub unsafe extern "C" fn n3p_parker_new(
             Parker::by(method, vehicle, models)?
         };
         let made = made.margin(options.margin)?.allow_contact(options.allow_contact)?;
+        let made = made.standstill_steering(options.standstill_steering()?);
         parker.put(PARKERS.open(made.budget(options.budget()?)));
         Ok(())
     })

@@ -104,7 +104,11 @@ pub unsafe extern "C" fn n3p_plan_poses(
         let file = plan.poses();
         let poses = (0..file.poses.len()).map(|i| {
             let [x, y, heading] = file.poses[i];
-            n3p_path_pose { x, y, heading, steer: file.steer[i], gear: file.gears[i].into() }
+            let steer = file.steer[i];
+            let [steer_from, steer_to] = [&file.steer_from, &file.steer_to]
+                .map(|angles| angles.as_ref().map_or(steer, |angles| angles[i]));
+            let gear = file.gears[i].into();
+            n3p_path_pose { x, y, heading, steer, steer_from, steer_to, gear }
         });
         // SAFETY: what this function asks for.
         unsafe { fill(poses, buffer, capacity, count) }

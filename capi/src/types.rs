@@ -2,6 +2,7 @@
 
 use n3p::Vehicle;
 use n3p::curves::TrajectoryLimits;
+use n3p::curves::smoothing::StandstillSteering;
 use n3p::curves::trajectory::Moment;
 use n3p::geometry::Pose;
 use n3p::planners::{Budget, Effort};
@@ -46,6 +47,8 @@ pub struct n3p_vehicle {
     pub forward_speed: f64,
     /// Speed when driving backward, m/s; positive.
     pub backward_speed: f64,
+    /// How fast the front wheels turn, rad/s; only trajectories depend on it.
+    pub steer_rate: f64,
 }
 
 impl From<n3p_vehicle> for Vehicle {
@@ -58,6 +61,7 @@ impl From<n3p_vehicle> for Vehicle {
             max_steer: v.max_steer,
             forward_speed: v.forward_speed,
             backward_speed: v.backward_speed,
+            steer_rate: v.steer_rate,
         }
     }
 }
@@ -72,6 +76,7 @@ impl From<Vehicle> for n3p_vehicle {
             max_steer: v.max_steer,
             forward_speed: v.forward_speed,
             backward_speed: v.backward_speed,
+            steer_rate: v.steer_rate,
         }
     }
 }
@@ -93,6 +98,18 @@ pub enum n3p_effort {
     N3P_EFFORT_MOST = 2,
 }
 
+/// Where the steering wheel may be turned while the car stands. Elsewhere it turns as the car drives, and
+/// the steering angle is continuous.
+#[repr(C)]
+pub enum n3p_standstill_steering {
+    /// Wherever the curvature jumps: paths are arcs and straights.
+    N3P_STEERING_ANYWHERE = 0,
+    /// Where the gear changes, and at the start where nothing else fits.
+    N3P_STEERING_AT_CHANGES = 1,
+    /// Nowhere.
+    N3P_STEERING_NEVER = 2,
+}
+
 /// How a parker plans. All zeros are the defaults.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
@@ -110,6 +127,8 @@ pub struct n3p_options {
     pub max_expansions: usize,
     /// What becomes of a first path, an n3p_effort.
     pub effort: i32,
+    /// Where the steering wheel may be turned while the car stands, an n3p_standstill_steering.
+    pub standstill_steering: i32,
 }
 
 impl n3p_options {
@@ -119,7 +138,25 @@ impl n3p_options {
         allow_contact: 0.0,
         max_expansions: 0,
         effort: n3p_effort::N3P_EFFORT_USUAL as i32,
+        standstill_steering: n3p_standstill_steering::N3P_STEERING_ANYWHERE as i32,
     };
+
+    pub(crate) fn standstill_steering(&self) -> Result<StandstillSteering> {
+        match self.standstill_steering {
+            s if s == n3p_standstill_steering::N3P_STEERING_ANYWHERE as i32 => {
+                Ok(StandstillSteering::Anywhere)
+            }
+            s if s == n3p_standstill_steering::N3P_STEERING_AT_CHANGES as i32 => {
+                Ok(StandstillSteering::AtChanges)
+            }
+            s if s == n3p_standstill_steering::N3P_STEERING_NEVER as i32 => {
+                Ok(StandstillSteering::Never)
+            }
+            other => Err(Failure::bad_input(format!(
+                "options.standstill_steering is {other}; expected an n3p_standstill_steering, 0 to 2"
+            ))),
+        }
+    }
 
     pub(crate) fn budget(&self) -> Result<Budget> {
         let effort = match self.effort {
@@ -241,6 +278,11 @@ pub struct n3p_path_pose {
     /// Angle of the front wheels on the way to the next pose, radians, positive to the left; at the
     /// end that which led there.
     pub steer: f64,
+    /// Angle of the front wheels at this pose, and with which the way to the next one ends: they differ from
+    /// `steer` where the steering angle changes on the way.
+    pub steer_from: f64,
+    /// See `steer_from`.
+    pub steer_to: f64,
     /// Gear on the way to the next pose: 1 forward, -1 backward; at the end that which led there.
     pub gear: i32,
 }
@@ -253,6 +295,10 @@ pub struct n3p_limits {
     pub forward_acceleration: f64,
     /// The same when driving backward, m/s².
     pub backward_acceleration: f64,
+    /// Largest v²·|κ| at the rear axle, m/s².
+    pub lateral_acceleration: f64,
+    /// How fast the acceleration changes at most, m/s³.
+    pub jerk: f64,
     /// How fast the front wheels turn, rad/s.
     pub steer_rate: f64,
     /// Not 0: the car stops wherever the steering angle jumps.
@@ -264,19 +310,23 @@ impl From<n3p_limits> for TrajectoryLimits {
         Self {
             forward_acceleration: limits.forward_acceleration,
             backward_acceleration: limits.backward_acceleration,
+            lateral_acceleration: limits.lateral_acceleration,
+            jerk: limits.jerk,
             steer_rate: limits.steer_rate,
             stop_to_steer: limits.stop_to_steer != 0,
         }
     }
 }
 
-/// 1 m/s² in both gears, 0.6 rad/s, and no stops to steer.
+/// 1 m/s² in both gears, 2 m/s² to the side, 2 m/s³, 0.6 rad/s, and no stops to steer.
 #[unsafe(no_mangle)]
 pub extern "C" fn n3p_limits_default() -> n3p_limits {
     let limits = TrajectoryLimits::default();
     n3p_limits {
         forward_acceleration: limits.forward_acceleration,
         backward_acceleration: limits.backward_acceleration,
+        lateral_acceleration: limits.lateral_acceleration,
+        jerk: limits.jerk,
         steer_rate: limits.steer_rate,
         stop_to_steer: limits.stop_to_steer.into(),
     }

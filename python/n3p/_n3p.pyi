@@ -11,6 +11,7 @@ from n3p.errors import N3PError
 ParkingType = Literal["forward", "reverse", "parallel", "angled"]
 Level = Literal["easy", "complex", "extreme"]
 Effort = Literal["first", "usual", "most"]
+StandstillSteering = Literal["anywhere", "at-changes", "never"]
 Path = Union[str, PathLike[str]]
 SceneLike = Union["Scene", dict[str, Any], Path]
 VehicleLike = Union["Vehicle", dict[str, float]]
@@ -30,6 +31,7 @@ class Vehicle:
         max_steer: float | None = None,
         forward_speed: float = 2.0,
         backward_speed: float = 1.0,
+        steer_rate: float = 0.6,
     ) -> None: ...
     @property
     def length(self) -> float: ...
@@ -45,6 +47,8 @@ class Vehicle:
     def forward_speed(self) -> float: ...
     @property
     def backward_speed(self) -> float: ...
+    @property
+    def steer_rate(self) -> float: ...
     @property
     def turning_radius(self) -> float: ...
     def to_dict(self) -> dict[str, float]: ...
@@ -120,6 +124,10 @@ class Parker:
         allow_contact: float = 0.0,
         effort: Effort = "usual",
         max_expansions: int = 200_000,
+        standstill_steering: StandstillSteering = "anywhere",
+        least_move: float | None = None,
+        last_straight: float | None = None,
+        cost: dict[str, float] | None = None,
     ) -> None: ...
     def plan(
         self,
@@ -151,6 +159,12 @@ class Plan:
     @property
     def steer(self) -> NDArray[np.float64]: ...
     @property
+    def steer_from(self) -> NDArray[np.float64]: ...
+    @property
+    def steer_to(self) -> NDArray[np.float64]: ...
+    @property
+    def motions(self) -> NDArray[np.float64]: ...
+    @property
     def segments(self) -> NDArray[np.float64]: ...
     @property
     def length(self) -> float: ...
@@ -173,7 +187,9 @@ class Plan:
         *,
         acceleration: float = 1.0,
         backward_acceleration: float | None = None,
-        steer_rate: float = 0.6,
+        lateral_acceleration: float = 2.0,
+        jerk: float = 2.0,
+        steer_rate: float | None = None,
         stop_to_steer: bool = False,
     ) -> Trajectory: ...
     def to_json(self) -> str: ...
@@ -218,5 +234,6 @@ def evaluate(
     allow_contact: float = 0.0,
     effort: Effort = "usual",
     max_expansions: int = 200_000,
+    standstill_steering: StandstillSteering = "anywhere",
     threads: int = 1,
 ) -> Rows: ...

@@ -11,9 +11,11 @@ use pyo3::types::{PyDict, PyString};
 
 use n3p::episode::{self, CERTIFICATE, Case, EpisodeConfig, Row};
 use n3p::n3p::MethodSettings;
+use n3p::planners::goals::Terms;
 use n3p::{Method, Models, world};
 
 use crate::errors::{Fault, guarded};
+use crate::inputs;
 use crate::parker::{Settings, method};
 use crate::scene::scene;
 
@@ -30,7 +32,7 @@ use crate::scene::scene;
 ///     Of ``n3p.METHODS``.
 /// models : list of path, optional
 ///     Trained models of your own; those of the package where it is left out.
-/// margin, allow_contact, effort, max_expansions
+/// margin, allow_contact, effort, max_expansions, standstill_steering
 ///     As in `Parker`.
 /// threads : int
 ///     More than one disturbs the times, never the results.
@@ -47,7 +49,7 @@ use crate::scene::scene;
 /// n3p.BadInput
 ///     A method or a scene cannot be used.
 #[pyfunction]
-#[pyo3(signature = (scenes, methods=None, *, models=None, margin=0.0, allow_contact=0.0, effort="usual", max_expansions=200_000, threads=1))]
+#[pyo3(signature = (scenes, methods=None, *, models=None, margin=0.0, allow_contact=0.0, effort="usual", max_expansions=200_000, standstill_steering="anywhere", threads=1))]
 #[expect(clippy::too_many_arguments, reason = "they have names in Python")]
 pub fn evaluate<'py>(
     py: Python<'py>,
@@ -58,17 +60,18 @@ pub fn evaluate<'py>(
     allow_contact: f64,
     effort: &str,
     max_expansions: i64,
+    standstill_steering: &str,
     threads: i64,
 ) -> Result<Bound<'py, PyAny>, Fault> {
     let cases = cases(scenes)?;
     let methods = self::methods(methods)?;
     let settings = Settings { models, effort, max_expansions };
+    let standstill = inputs::standstill(standstill_steering)?;
     let config = EpisodeConfig {
-        margin_m: margin,
-        allow_contact_m: allow_contact,
+        terms: Terms { margin, contact: allow_contact, standstill, ..Terms::default() },
         ..EpisodeConfig::new(settings.budget()?)
     };
-    config.terms().check().map_err(Fault::bad)?;
+    config.terms.check().map_err(Fault::bad)?;
     let Some(threads) = usize::try_from(threads).ok().filter(|n| (1..=1024).contains(n)) else {
         return Err(Fault::bad(format!("threads: is {threads}; expected 1 to 1024")));
     };

@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyFloat, PyList, PyString, PyTuple, PyType};
 
+use n3p::curves::smoothing::StandstillSteering;
 use n3p::world::{GoalTolerance, ParkingType};
 use n3p::{Lot, Request};
 
@@ -339,4 +340,9 @@ pub fn path(object: &Bound<'_, PyAny>) -> Option<std::path::PathBuf> {
     let path_like = PATH_LIKE.import(object.py(), "os", "PathLike").ok()?;
     let is_one = object.is_instance_of::<PyString>() || object.is_instance(path_like).ok()?;
     is_one.then(|| object.extract().ok()).flatten()
+}
+
+/// Where the steering wheel may be turned while the car stands.
+pub fn standstill(name: &str) -> Result<StandstillSteering, Fault> {
+    name.parse().map_err(|e| Fault::bad(format!("standstill_steering: {e}")))
 }

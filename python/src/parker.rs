@@ -6,11 +6,14 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 
-use n3p::planners::{Budget, Effort};
+use n3p::planners::cost::CostModel;
+use n3p::planners::goals::Terms;
+use n3p::planners::{Budget, Effort, Shape};
 use n3p::{Method, Models, world};
 
 use crate::errors::{Fault, guarded};
 use crate::inputs::{self, LotArguments, RequestArguments};
+use crate::json;
 use crate::plan::Plan;
 use crate::scene::{Scene, scene};
 use crate::vehicle::{Vehicle, vehicle};
@@ -37,6 +40,15 @@ use crate::vehicle::{Vehicle, vehicle};
 ///     What becomes of a first path: "first" takes it as it is.
 /// max_expansions : int
 ///     Work that a plan may take, in node expansions.
+/// standstill_steering : {"anywhere", "at-changes", "never"}
+///     Where the steering wheel may be turned while the car stands: "anywhere" plans arcs and straights, the
+///     others paths on which the steering angle is continuous while the car drives.
+/// least_move, last_straight : float, optional
+///     The least length between changes of gear and of the straight at the end, metres, where there is room;
+///     0.3 and 0.5 for a usual car where the steering is continuous, else 0.
+/// cost : dict, optional
+///     Weights of the costs by which plans are chosen, such as ``{"gear_change": 6.0}``: ``forward``,
+///     ``backward``, ``gear_change``, ``steer``, ``steer_change``, ``clearance``, ``near``.
 ///
 /// Raises
 /// ------
@@ -104,7 +116,7 @@ impl Settings<'_, '_> {
 #[pymethods]
 impl Parker {
     #[new]
-    #[pyo3(signature = (vehicle=None, method="n3p", models=None, margin=0.0, allow_contact=0.0, effort="usual", max_expansions=200_000))]
+    #[pyo3(signature = (vehicle=None, method="n3p", models=None, margin=0.0, allow_contact=0.0, effort="usual", max_expansions=200_000, standstill_steering="anywhere", least_move=None, last_straight=None, cost=None))]
     #[expect(clippy::too_many_arguments, reason = "they have names in Python")]
     fn new(
         py: Python<'_>,
@@ -115,13 +127,34 @@ impl Parker {
         allow_contact: f64,
         effort: &str,
         max_expansions: i64,
+        standstill_steering: &str,
+        least_move: Option<f64>,
+        last_straight: Option<f64>,
+        cost: Option<&Bound<'_, PyAny>>,
     ) -> Result<Self, Fault> {
         let vehicle = self::vehicle(vehicle)?;
+        let standstill = inputs::standstill(standstill_steering)?;
+        let terms = Terms { standstill, ..Terms::default() };
+        let usual = terms.shape_for(&vehicle);
         let method = self::method(method, "method")?;
         let settings = Settings { models, effort, max_expansions };
         let (models, budget) = (settings.models(&[method], &vehicle)?, settings.budget()?);
         let made = py.detach(|| guarded(|| n3p::Parker::by(method, vehicle, models)))?;
-        Ok(Self(made?.margin(margin)?.allow_contact(allow_contact)?.budget(budget)))
+        let mut made = made?.margin(margin)?.allow_contact(allow_contact)?.budget(budget);
+        made = made.standstill_steering(standstill);
+        if least_move.is_some() || last_straight.is_some() {
+            made = made.shape(Shape {
+                least_move: least_move.unwrap_or(usual.least_move),
+                last_straight: last_straight.unwrap_or(usual.last_straight),
+            })?;
+        }
+        if let Some(cost) = cost {
+            let value = json::value(cost, "cost")?;
+            let cost: CostModel =
+                serde_json::from_value(value).map_err(|e| Fault::bad(format!("cost: {e}")))?;
+            made = py.detach(|| guarded(|| made.cost(cost)))??;
+        }
+        Ok(Self(made))
     }
 
     /// Plans from ``start`` to ``goal`` among what is given.

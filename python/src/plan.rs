@@ -9,7 +9,7 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::PyDict;
 
 use n3p::curves::trajectory::Moment;
-use n3p::curves::{Segment, TrajectoryLimits};
+use n3p::curves::{Clothoid, Segment, TrajectoryLimits};
 use n3p::output::PathFile;
 use n3p::world::ParkingType;
 
@@ -26,6 +26,7 @@ pub struct Plan {
     poses: PyOnceLock<Py<PyArray2<f64>>>,
     gears: PyOnceLock<Py<PyArray1<i8>>>,
     steer: PyOnceLock<Py<PyArray1<f64>>>,
+    steer_ends: [PyOnceLock<Py<PyArray1<f64>>>; 2],
     segments: PyOnceLock<Py<PyArray2<f64>>>,
 }
 
@@ -37,6 +38,7 @@ impl Plan {
             poses: PyOnceLock::new(),
             gears: PyOnceLock::new(),
             steer: PyOnceLock::new(),
+            steer_ends: [PyOnceLock::new(), PyOnceLock::new()],
             segments: PyOnceLock::new(),
         }
     }
@@ -99,14 +101,42 @@ impl Plan {
         self.steer.get_or_init(py, make).bind(py).clone()
     }
 
+    /// Angle of the front wheels at each pose, of the motion that follows it, float64 (N,). On the way to the next
+    /// pose the curvature changes steadily to that of `steer_to`; both are `steer` for arcs.
+    #[getter]
+    fn steer_from<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let file = self.file();
+        let make =
+            || frozen(PyArray1::from_slice(py, file.steer_from.as_deref().unwrap_or(&file.steer)));
+        self.steer_ends[0].get_or_init(py, make).bind(py).clone()
+    }
+
+    /// Angle of the front wheels with which the motion that follows each pose ends, float64 (N,).
+    #[getter]
+    fn steer_to<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let file = self.file();
+        let make =
+            || frozen(PyArray1::from_slice(py, file.steer_to.as_deref().unwrap_or(&file.steer)));
+        self.steer_ends[1].get_or_init(py, make).bind(py).clone()
+    }
+
     /// The path as motions of constant curvature, float64 (M, 2): curvature (1/m, positive to the
     /// left) and length (metres, negative backward). Driven one after the other from ``poses[0]``
-    /// they lead to ``poses[-1]``, as exactly as numbers add up.
+    /// they lead to ``poses[-1]``, as exactly as numbers add up. Where the steering is continuous they are arcs from
+    /// which the path is nowhere farther than half of the margin: see `motions`.
     #[getter]
     fn segments<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         let row = |segment: &Segment| [segment.curvature, segment.length];
         let make = || frozen(rows(py, self.plan.path().segments.iter().map(row)));
         self.segments.get_or_init(py, make).bind(py).clone()
+    }
+
+    /// The path as motions of steadily changing curvature, float64 (M, 3): curvature where each begins and
+    /// ends (1/m, positive to the left) and length (metres, negative backward).
+    #[getter]
+    fn motions<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let row = |motion: &Clothoid| [motion.from, motion.to, motion.length];
+        rows(py, self.plan.smooth_path().motions.iter().map(row))
     }
 
     /// Driven length, metres.
@@ -166,8 +196,12 @@ impl Plan {
     ///     Largest acceleration and braking, m/s².
     /// backward_acceleration : float, optional
     ///     The same in backward gear, where it differs.
-    /// steer_rate : float
-    ///     How fast the front wheels turn, rad/s.
+    /// lateral_acceleration : float
+    ///     Largest v²·|κ| at the rear axle, m/s².
+    /// jerk : float
+    ///     How fast the acceleration changes at most, m/s³.
+    /// steer_rate : float, optional
+    ///     How fast the front wheels turn, rad/s; the vehicle's where it is left out.
     /// stop_to_steer : bool
     ///     Whether the car stops wherever the steering angle jumps, and turns its wheels there.
     ///
@@ -182,19 +216,24 @@ impl Plan {
     /// ------
     /// n3p.BadInput
     ///     For a limit outside its range.
-    #[pyo3(signature = (*, acceleration=1.0, backward_acceleration=None, steer_rate=0.6, stop_to_steer=false))]
+    #[pyo3(signature = (*, acceleration=1.0, backward_acceleration=None, lateral_acceleration=2.0, jerk=2.0, steer_rate=None, stop_to_steer=false))]
+    #[expect(clippy::too_many_arguments, reason = "they have names in Python")]
     fn trajectory<'py>(
         &self,
         py: Python<'py>,
         acceleration: f64,
         backward_acceleration: Option<f64>,
-        steer_rate: f64,
+        lateral_acceleration: f64,
+        jerk: f64,
+        steer_rate: Option<f64>,
         stop_to_steer: bool,
     ) -> Result<Bound<'py, PyAny>, Fault> {
         let limits = TrajectoryLimits {
             forward_acceleration: acceleration,
             backward_acceleration: backward_acceleration.unwrap_or(acceleration),
-            steer_rate,
+            lateral_acceleration,
+            jerk,
+            steer_rate: steer_rate.unwrap_or(self.plan.vehicle().steer_rate),
             stop_to_steer,
         };
         let driven = guarded(|| self.plan.trajectory(&limits))?.map_err(Fault::bad)?;

@@ -24,6 +24,8 @@ use crate::json;
 ///     Largest steering angle of the front wheels, radians.
 /// forward_speed, backward_speed : float
 ///     Speeds, m/s.
+/// steer_rate : float
+///     How fast the front wheels turn, rad/s.
 ///
 /// Raises
 /// ------
@@ -51,7 +53,8 @@ pub fn vehicle(object: Option<&Bound<'_, PyAny>>) -> Result<n3p::Vehicle, Fault>
 #[pymethods]
 impl Vehicle {
     #[new]
-    #[pyo3(signature = (*, length=4.97, width=1.86, wheelbase=2.83, rear_overhang=1.10, max_steer=None, forward_speed=2.0, backward_speed=1.0))]
+    #[pyo3(signature = (*, length=4.97, width=1.86, wheelbase=2.83, rear_overhang=1.10, max_steer=None, forward_speed=2.0, backward_speed=1.0, steer_rate=0.6))]
+    #[expect(clippy::too_many_arguments, reason = "they have names in Python")]
     fn new(
         length: f64,
         width: f64,
@@ -60,6 +63,7 @@ impl Vehicle {
         max_steer: Option<f64>,
         forward_speed: f64,
         backward_speed: f64,
+        steer_rate: f64,
     ) -> Result<Self, Fault> {
         let max_steer = max_steer.unwrap_or(n3p::Vehicle::default().max_steer);
         let vehicle = n3p::Vehicle {
@@ -70,6 +74,7 @@ impl Vehicle {
             max_steer,
             forward_speed,
             backward_speed,
+            steer_rate,
         };
         vehicle.validate().map_err(Fault::bad)?;
         Ok(Self(vehicle))
@@ -117,6 +122,12 @@ impl Vehicle {
         self.0.backward_speed
     }
 
+    /// How fast the front wheels turn, rad/s.
+    #[getter]
+    fn steer_rate(&self) -> f64 {
+        self.0.steer_rate
+    }
+
     /// Radius of the rear axle's tightest circle, metres.
     #[getter]
     fn turning_radius(&self) -> f64 {
@@ -140,11 +151,12 @@ impl Vehicle {
 
     fn __repr__(&self) -> String {
         let n3p::Vehicle { length, width, wheelbase, rear_overhang, max_steer, .. } = self.0;
-        let n3p::Vehicle { forward_speed, backward_speed, .. } = self.0;
+        let n3p::Vehicle { forward_speed, backward_speed, steer_rate, .. } = self.0;
         format!(
             "Vehicle(length={length}, width={width}, wheelbase={wheelbase}, \
              rear_overhang={rear_overhang}, max_steer={max_steer}, \
-             forward_speed={forward_speed}, backward_speed={backward_speed})"
+             forward_speed={forward_speed}, backward_speed={backward_speed}, \
+             steer_rate={steer_rate})"
         )
     }
 

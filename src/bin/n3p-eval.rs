@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::Parser;
-use n3p::cli::{self, BadInput, OrBadInput, PolicyArgs, TermsArgs};
+use n3p::cli::{self, BadInput, CostArgs, OrBadInput, PolicyArgs, TermsArgs};
 use n3p::episode::Case;
 use n3p::lab::driving::{DriveConfig, drive};
 use n3p::lab::evaluation::report::{self, Provenance};
@@ -14,7 +14,7 @@ use n3p::lab::evaluation::suite::{self, Drawn, SuiteConfig, SuiteError, World};
 use n3p::lab::evaluation::{Outputs, drives, metrics, quality};
 use n3p::lab::progress;
 use n3p::lab::training;
-use n3p::n3p::{Method, MethodSettings, Models};
+use n3p::n3p::{Method, Models};
 use n3p::planners::{Budget, Effort};
 use n3p::vehicle::Vehicle;
 use n3p::world::generate::GeneratorConfig;
@@ -69,6 +69,8 @@ struct Args {
     json: bool,
     #[command(flatten)]
     terms: TermsArgs,
+    #[command(flatten)]
+    cost: CostArgs,
     /// Expansion budget per scene and method.
     #[arg(long, default_value_t = 200_000, value_name = "N")]
     max_expansions: usize,
@@ -159,7 +161,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
             [] => Method::available(&models),
             given => given.to_vec(),
         },
-        settings: MethodSettings::default(),
+        settings: args.cost.settings()?,
         budget: Budget { max_expansions: args.max_expansions, effort: args.effort },
         terms: args
             .terms

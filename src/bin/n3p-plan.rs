@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::Parser;
-use n3p::cli::{self, BadInput, OrBadInput, PolicyArgs, TermsArgs};
+use n3p::cli::{self, BadInput, CostArgs, OrBadInput, PolicyArgs, TermsArgs};
 use n3p::curves::TrajectoryLimits;
 use n3p::curves::smoothing::StandstillSteering;
 use n3p::curves::trajectory::TrajectoryReport;
@@ -46,6 +46,8 @@ struct Args {
     policy: PolicyArgs,
     #[command(flatten)]
     terms: TermsArgs,
+    #[command(flatten)]
+    cost: CostArgs,
     /// Write the path to this JSON file.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -173,7 +175,7 @@ fn plan(args: &Args) -> Result<ExitCode> {
         check_writable(path).map_err(|e| unwritable(path, e))?;
     }
     let (method, models) = choose(args, &scene, &problem)?;
-    let mut planner = method.build(&models, &MethodSettings::default()).or_bad_input()?;
+    let mut planner = method.build(&models, &args.cost.settings()?).or_bad_input()?;
     let case = Case { kind: problem.kind, level: None, set: String::new(), scene };
     // One run, as it comes: the time includes what a first call costs.
     let budget = Budget { max_expansions: args.max_expansions, effort: args.effort };

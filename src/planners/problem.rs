@@ -70,13 +70,21 @@ impl Terms {
         self.shape.unwrap_or(usual)
     }
 
-    /// Checks both numbers.
+    /// Checks every number.
     pub fn check(self) -> Result<(), ProblemError> {
         if !(0.0..=Problem::MAX_MARGIN).contains(&self.margin) {
             return Err(ProblemError::Margin(self.margin));
         }
         if !(0.0..=Problem::MAX_CONTACT).contains(&self.contact) {
             return Err(ProblemError::Contact(self.contact));
+        }
+        let shape = self.shape.unwrap_or_default();
+        for (field, value) in
+            [("least_move", shape.least_move), ("last_straight", shape.last_straight)]
+        {
+            if !(0.0..=Shape::MOST).contains(&value) {
+                return Err(ProblemError::Shape(field, value));
+            }
         }
         Ok(())
     }
@@ -108,6 +116,9 @@ pub enum ProblemError {
         max = Problem::MAX_CONTACT
     )]
     Contact(f64),
+    /// A length of the shape of paths that is none.
+    #[error("{0} is {1} m; expected a number from 0 to {max}", max = Shape::MOST)]
+    Shape(&'static str, f64),
     /// The start footprint touches an obstacle or its axle is out of bounds.
     #[error("start: the footprint at {0:?} {1}")]
     StartInCollision([f64; 3], Conflict),
