@@ -141,6 +141,10 @@ typedef struct n3p_vehicle {
      * Speed when driving backward, m/s; positive.
      */
     double backward_speed;
+    /**
+     * How fast the front wheels turn, rad/s; only trajectories depend on it. 0: as usual, 0.6.
+     */
+    double steer_rate;
 } n3p_vehicle;
 
 /**
@@ -155,6 +159,14 @@ typedef struct n3p_limits {
      * The same when driving backward, m/s².
      */
     double backward_acceleration;
+    /**
+     * Largest v²·|κ| at the rear axle, m/s².
+     */
+    double lateral_acceleration;
+    /**
+     * How fast the acceleration changes at most, m/s³.
+     */
+    double jerk;
     /**
      * How fast the front wheels turn, rad/s.
      */
@@ -192,6 +204,10 @@ typedef struct n3p_options {
      * What becomes of a first path, an n3p_effort.
      */
     int32_t effort;
+    /**
+     * Where the steering wheel may be turned while the car stands, an n3p_standstill_steering.
+     */
+    int32_t standstill_steering;
 } n3p_options;
 
 /**
@@ -304,6 +320,15 @@ typedef struct n3p_path_pose {
      */
     double steer;
     /**
+     * Angle of the front wheels at this pose, and with which the way to the next one ends: they differ from
+     * `steer` where the steering angle changes on the way.
+     */
+    double steer_from;
+    /**
+     * See `steer_from`.
+     */
+    double steer_to;
+    /**
      * Gear on the way to the next pose: 1 forward, -1 backward; at the end that which led there.
      */
     int32_t gear;
@@ -376,7 +401,7 @@ const char *n3p_version(void);
 struct n3p_vehicle n3p_vehicle_default(void);
 
 /**
- * 1 m/s² in both gears, 0.6 rad/s, and no stops to steer.
+ * 1 m/s² in both gears, 2 m/s² to the side, 2 m/s³, 0.6 rad/s, and no stops to steer.
  */
 struct n3p_limits n3p_limits_default(void);
 

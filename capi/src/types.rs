@@ -47,7 +47,7 @@ pub struct n3p_vehicle {
     pub forward_speed: f64,
     /// Speed when driving backward, m/s; positive.
     pub backward_speed: f64,
-    /// How fast the front wheels turn, rad/s; only trajectories depend on it.
+    /// How fast the front wheels turn, rad/s; only trajectories depend on it. 0: as usual, 0.6.
     pub steer_rate: f64,
 }
 
@@ -61,7 +61,7 @@ impl From<n3p_vehicle> for Vehicle {
             max_steer: v.max_steer,
             forward_speed: v.forward_speed,
             backward_speed: v.backward_speed,
-            steer_rate: v.steer_rate,
+            steer_rate: if v.steer_rate == 0.0 { Self::default().steer_rate } else { v.steer_rate },
         }
     }
 }

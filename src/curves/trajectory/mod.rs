@@ -153,7 +153,9 @@ impl Trajectory {
                 let rest = Interval {
                     duration: whole.duration - begun,
                     speed: whole.speed_after(begun),
-                    acceleration: whole.acceleration_after(begun),
+                    acceleration: whole
+                        .acceleration_after(begun)
+                        .clamp(-rates.acceleration, rates.acceleration),
                     ..whole
                 };
                 let is_last = i + 1 == legs.len();

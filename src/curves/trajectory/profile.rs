@@ -104,7 +104,8 @@ impl Rates {
         let sign = (to - from).signum();
         let duration = self.time(from, to);
         let rise = (self.acceleration / self.jerk).min(duration / 2.0);
-        let (peak, jerk) = (sign * self.jerk * rise, sign * self.jerk);
+        let peak = sign * (self.jerk * rise).min(self.acceleration);
+        let jerk = sign * self.jerk;
         let first = Interval { duration: rise, speed: from, acceleration: 0.0, jerk };
         let steady = Interval {
             duration: duration - 2.0 * rise,

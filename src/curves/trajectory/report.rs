@@ -101,8 +101,8 @@ impl TrajectoryReport {
                 Gear::Backward => &mut report.max_backward_speed_mps,
             };
             raise(fastest, speed);
-            let acceleration = ends[0].acceleration.abs().max(ends[1].acceleration.abs());
-            raise(&mut report.max_acceleration_mps2, acceleration);
+            // It rises and falls steadily, and where it is largest another phase begins.
+            raise(&mut report.max_acceleration_mps2, ends[0].acceleration.abs());
             raise(&mut report.max_jerk_mps3, phase.drive.jerk.abs());
             raise(&mut report.max_lateral_acceleration_mps2, speed * speed * curvature);
             raise(&mut report.max_abs_steer_rad, ends[0].steer.abs().max(ends[1].steer.abs()));
