@@ -187,10 +187,8 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
         }
         bar.set_message(format!("{} {}", episode.row.method, episode.row.scene));
         bar.inc(1);
-        if let Some(drive) = driving.as_ref().and_then(|config| drive(case, episode, config)) {
-            outputs.take_drive(drive.row);
-        }
-        outputs.take(case, episode, &models).map_err(anyhow::Error::from)
+        let driven = driving.as_ref().and_then(|config| drive(case, episode, config));
+        outputs.take(case, episode, &models, driven).map_err(anyhow::Error::from)
     });
     // As in the checks before: a suite that cannot run is the user's to mend, a full disk is not.
     let mut rows = rows.map_err(|error| match error.downcast::<SuiteError>() {

@@ -17,7 +17,7 @@ use n3p::output::drawing::{Drawing, scene_svg};
 use n3p::files::{check_writable, reason, write_whole};
 use n3p::geometry::{Pose, signed_angle};
 use n3p::n3p::{Method, MethodSettings, Models, catalogue};
-use n3p::output::TrajectoryFile;
+use n3p::output::{TrajectoryFile, trajectory_svg};
 use n3p::planners::goals::{self, PassedOver, Terms};
 use n3p::planners::{Budget, Effort, NoPath, Problem, ProblemError};
 use n3p::vehicle::Vehicle;
@@ -59,6 +59,9 @@ struct Args {
     /// where such a path is found; else the car stops to steer.
     #[arg(long, value_name = "FILE", value_parser = TrajectoryFile::file_name)]
     trajectory: Option<PathBuf>,
+    /// Draw the speed, the steering angle and the curvature of the trajectory over time to this SVG file.
+    #[arg(long, value_name = "FILE", requires = "trajectory")]
+    trajectory_svg: Option<PathBuf>,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -171,7 +174,8 @@ fn plan(args: &Args) -> Result<ExitCode> {
             format!("{}: cannot be written: {}; choose another file", path.display(), reason(&e));
         anyhow::Error::from(BadInput(text))
     };
-    for path in args.out.iter().chain(&args.svg).chain(&args.trajectory) {
+    let outputs = args.out.iter().chain(&args.svg).chain(&args.trajectory);
+    for path in outputs.chain(&args.trajectory_svg) {
         check_writable(path).map_err(|e| unwritable(path, e))?;
     }
     let (method, models) = choose(args, &scene, &problem)?;
@@ -223,6 +227,10 @@ fn plan(args: &Args) -> Result<ExitCode> {
             let limits = TrajectoryLimits { stop_to_steer, ..limits };
             let made = TrajectoryFile::new(&scene, frame, &path, method.name(), limits)?;
             made.write(file).map_err(|e| unwritable(file, e))?;
+            if let Some(svg) = &args.trajectory_svg {
+                let plot = trajectory_svg(&made);
+                write_whole(svg, plot.as_bytes()).map_err(|e| unwritable(svg, e))?;
+            }
             Some(made.report)
         }
         _ => None,

@@ -99,6 +99,11 @@ impl Clothoid {
         if length == 0.0 {
             return [0.0; 3];
         }
+        if self.is_arc() {
+            let turn = self.turn();
+            let [ahead, left] = Segment { curvature: from, length }.way(length, turn.sin_cos());
+            return [ahead, left, turn];
+        }
         let pieces = (self.max_abs_curvature() * length.abs() / Self::PIECE).ceil().max(1.0);
         let (h, slope) = (length / pieces, (to - from) / length);
         let (mut ahead, mut left) = (0.0, 0.0);

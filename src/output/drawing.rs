@@ -357,7 +357,7 @@ fn num(v: f64) -> String {
 }
 
 /// `text` as XML text.
-fn escape(text: &str) -> String {
+pub(super) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {

@@ -3,6 +3,8 @@
 pub mod drawing;
 pub(crate) mod path_file;
 pub(crate) mod trajectory_file;
+mod trajectory_plot;
 
 pub use path_file::{PathFile, PathFileError};
 pub use trajectory_file::{Driven, TrajectoryFile};
+pub use trajectory_plot::trajectory_svg;

@@ -8,7 +8,7 @@ use std::io;
 use std::path::{Path as FilePath, PathBuf};
 
 use serde::{Serialize, Serializer};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::path_file::{Near, snap};
 use crate::curves::trajectory::{LimitError, Moment, TrajectoryReport};
@@ -110,9 +110,15 @@ impl TrajectoryFile {
         known.then_some(file).ok_or_else(|| "expected a name ending in .csv or .json".to_owned())
     }
 
-    /// Writes CSV where the name ends in `.csv`, else JSON (to a temporary name, then renamed).
+    /// Writes CSV where the name ends in `.csv`, poses and twists where it ends in `.ros.json`, else JSON (to a
+    /// temporary name, then renamed).
     pub fn write(&self, file: &FilePath) -> io::Result<()> {
-        let text = if has_ending(file, "csv") { self.to_csv() } else { self.to_json() };
+        let stem = file.file_stem().map(FilePath::new);
+        let text = match has_ending(file, "csv") {
+            true => self.to_csv(),
+            false if stem.is_some_and(|stem| has_ending(stem, "ros")) => self.to_ros_json(),
+            false => self.to_json(),
+        };
         write_whole(file, text.as_bytes())
     }
 
@@ -121,6 +127,34 @@ impl TrajectoryFile {
         let line = |m| COLUMNS.map(|(_, value)| value(m).to_string()).join(",");
         lines.extend(self.moments.iter().map(line));
         lines.join("\n") + "\n"
+    }
+
+    /// Points as robots' messages have them: time from the start, pose with a quaternion, twist in the frame of
+    /// the rear axle, acceleration, and the angle of the front wheels.
+    fn to_ros_json(&self) -> String {
+        let vector = |x: f64, z: f64| json!({"x": x, "y": 0.0, "z": z});
+        let point = |m: &Moment| {
+            let (sin, cos) = (m.pose.heading / 2.0).sin_cos();
+            let seconds = m.time.floor();
+            json!({
+                "time_from_start": {
+                    "sec": seconds as i64,
+                    "nanosec": (((m.time - seconds) * 1e9).round() as i64).min(999_999_999),
+                },
+                "pose": {
+                    "position": {"x": m.pose.x, "y": m.pose.y, "z": 0.0},
+                    "orientation": {"x": 0.0, "y": 0.0, "z": sin, "w": cos},
+                },
+                "twist": {
+                    "linear": vector(m.speed, 0.0),
+                    "angular": vector(0.0, m.speed * m.curvature),
+                },
+                "acceleration": {"linear": vector(m.acceleration, 0.0)},
+                "front_wheel_angle_rad": m.steer,
+            })
+        };
+        let points: Vec<Value> = self.moments.iter().map(point).collect();
+        json!({"header": {"frame_id": "map"}, "points": points}).to_string()
     }
 
     fn to_json(&self) -> String {

@@ -15,6 +15,7 @@ const STEPS: usize = 12;
 pub(super) fn fit(pieces: &mut [Piece], start: Pose, goal: Pose) -> bool {
     let mut ways: Vec<(Way, Way)> = Vec::with_capacity(pieces.len());
     let mut columns: Vec<Vector3<f64>> = Vec::with_capacity(pieces.len());
+    let mut clothoids: Vec<Option<[Way; 2]>> = vec![None; pieces.len()];
     let mut fixed = vec![false; pieces.len()];
     // Angles in metres: as the tightest turn sweeps them.
     let tightest = pieces.iter().map(|p| p.curvature.abs()).fold(0.0, f64::max);
@@ -24,7 +25,7 @@ pub(super) fn fit(pieces: &mut [Piece], start: Pose, goal: Pose) -> bool {
     let radius = 1.0 / tightest;
     for _ in 0..STEPS {
         ways.clear();
-        ways.extend(pieces.iter().map(Piece::way));
+        ways.extend(pieces.iter().zip(&mut clothoids).map(|(piece, kept)| piece.way(kept)));
         let whole =
             ways.iter().fold([start.x, start.y, start.heading], |a, (way, _)| then(a, *way));
         let miss = missed(whole, goal);
@@ -122,5 +123,5 @@ fn missed(whole: Way, goal: Pose) -> Vector3<f64> {
 
 fn miss(pieces: &[Piece], start: Pose, goal: Pose) -> Option<Vector3<f64>> {
     let start = [start.x, start.y, start.heading];
-    Some(missed(pieces.iter().fold(start, |a, piece| then(a, piece.way().0)), goal))
+    Some(missed(pieces.iter().fold(start, |a, piece| then(a, piece.way(&mut None).0)), goal))
 }

@@ -89,28 +89,33 @@ impl Piece {
         [ramp(begin, peak), motion(peak, peak, length), ramp(peak, end)]
     }
 
-    /// Where it leads, and how that changes with `value`.
-    pub fn way(&self) -> (Way, Way) {
+    /// Where it leads, and how that changes with `value`. `clothoids` are those of the whole curvature, which do
+    /// not change: they are kept there from one call to the next.
+    pub fn way(&self, clothoids: &mut Option<[Way; 2]>) -> (Way, Way) {
         if self.is_straight() {
             return ([self.gear * self.value, 0.0, 0.0], [self.gear, 0.0, 0.0]);
         }
-        let ways = |piece: &Self| piece.motions().map(Clothoid::way);
-        let [begin, arc, end] = ways(self);
-        let until = then(begin, arc);
-        let way = then(until, end);
         let (peak, _) = self.arc();
-        if peak == self.curvature.abs() {
-            // The arc is longer: what follows moves along, and turns about where the arc ends.
-            let (sin, cos) = until[2].sin_cos();
-            let length = self.gear / peak;
-            let turn = self.gear.copysign(self.curvature * self.gear);
-            let rest = [way[0] - until[0], way[1] - until[1]];
-            return (way, [length * cos - turn * rest[1], length * sin + turn * rest[0], turn]);
+        if peak < self.curvature.abs() {
+            const H: f64 = 1e-6;
+            let way = self.whole_way();
+            let longer = Self { value: self.value + H, ..*self }.whole_way();
+            return (way, [0, 1, 2].map(|i| (longer[i] - way[i]) / H));
         }
-        const H: f64 = 1e-6;
-        let [begin, arc, end] = ways(&Self { value: self.value + H, ..*self });
-        let longer = then(then(begin, arc), end);
-        (way, [0, 1, 2].map(|i| (longer[i] - way[i]) / H))
+        let [begin, arc, end] = self.motions();
+        let [begin, end] = *clothoids.get_or_insert_with(|| [begin.way(), end.way()]);
+        let until = then(begin, arc.way());
+        let way = then(until, end);
+        // The arc is longer: what follows moves along, and turns about where the arc ends.
+        let (sin, cos) = until[2].sin_cos();
+        let length = self.gear / peak;
+        let turn = self.gear.copysign(self.curvature * self.gear);
+        let rest = [way[0] - until[0], way[1] - until[1]];
+        (way, [length * cos - turn * rest[1], length * sin + turn * rest[0], turn])
+    }
+
+    fn whole_way(&self) -> Way {
+        self.motions().into_iter().fold([0.0; 3], |way, motion| then(way, motion.way()))
     }
 }
 
@@ -128,12 +133,12 @@ mod tests {
                     let piece =
                         Piece { gear, curvature, ends, sharpness: 0.3, floor: 0.0, value: 0.0 };
                     let piece = Piece { value: piece.least() + more, ..piece };
-                    let (way, change) = piece.way();
+                    let (way, change) = piece.way(&mut None);
                     let sign = gear * curvature.signum();
                     assert!((way[2] - sign * piece.value).abs() < 1e-12, "{piece:?} {way:?}");
                     let h = 1e-5;
-                    let (longer, _) = Piece { value: piece.value + h, ..piece }.way();
-                    let (shorter, _) = Piece { value: piece.value - h, ..piece }.way();
+                    let (longer, _) = Piece { value: piece.value + h, ..piece }.way(&mut None);
+                    let (shorter, _) = Piece { value: piece.value - h, ..piece }.way(&mut None);
                     for i in 0..3 {
                         let expected = (longer[i] - shorter[i]) / (2.0 * h);
                         assert!(

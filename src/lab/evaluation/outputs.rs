@@ -12,7 +12,7 @@ use super::rows::{self, RowWriter, RowsError};
 use super::trace::{self, Trace, TraceWriter};
 use crate::episode::{self, Case, Episode, Row};
 use crate::files::{reason, remove_leftovers, write_whole};
-use crate::lab::driving::DriveRow;
+use crate::lab::driving::{Drive, DriveRow};
 use crate::n3p::Models;
 use crate::output::{PathFile, PathFileError};
 
@@ -89,27 +89,25 @@ impl Outputs {
         Ok((outputs, done))
     }
 
-    /// Saves one episode, whose method was built from `models`: its trace, its row, and its
-    /// path where paths are wanted.
+    /// Saves one episode, whose method was built from `models`: its trace, its row, what became of it if it
+    /// was driven, and its path where paths are wanted.
     pub fn take(
         &mut self,
         case: &Case,
         episode: &Episode,
         models: &Models,
+        drive: Option<Drive>,
     ) -> Result<(), OutputError> {
         if self.writers.is_some() {
-            self.push_trace(&Trace::new(episode, models))?;
+            let driven = drive.as_ref().map_or(&[][..], |drive| &drive.poses);
+            self.push_trace(&Trace::new(episode, models, driven))?;
         }
+        self.drives.extend(drive.map(|drive| drive.row));
         self.push(&episode.row)?;
         if let (Some(dir), Some(path)) = (&self.paths, &episode.path) {
             path.write(&dir.join(PathFile::file_name(&case.scene, &episode.row.method)))?;
         }
         Ok(())
-    }
-
-    /// Keeps what became of a plan that was driven.
-    pub fn take_drive(&mut self, drive: DriveRow) {
-        self.drives.push(drive);
     }
 
     /// What became of the plans that were driven, so far.

@@ -35,11 +35,14 @@ pub struct Trace {
     /// The preparatory pose.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub preparatory: Option<Pose>,
+    /// Where the car was when the path was driven, to the millimetre.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub driven: Vec<[f64; 3]>,
 }
 
 impl Trace {
-    /// The trace of `episode`, whose method was built from `models`.
-    pub fn new(episode: &Episode, models: &Models) -> Self {
+    /// The trace of `episode`, whose method was built from `models`, and whose path was `driven` so.
+    pub fn new(episode: &Episode, models: &Models, driven: &[Pose]) -> Self {
         let frame = &episode.problem.frame;
         let path = episode.result.outcome.as_ref().ok().map(|p| p.to_world(frame));
         let guidance = episode.result.guidance.as_ref();
@@ -54,6 +57,7 @@ impl Trace {
                 both.map(|r| r.vertices().iter().map(|v| [v.x, v.y].map(mm)).collect())
             }),
             preparatory: guidance.and_then(|g| g.preparatory).map(|p| frame.world_from_local(p)),
+            driven: driven.iter().map(|&p| <[f64; 3]>::from(p).map(mm)).collect(),
         }
     }
 
@@ -127,6 +131,7 @@ mod tests {
             segments: vec![[0.246_5, 1.0 / 7.0], [0.0, -3.0]],
             regions: Some([vec![[0.0, 1.0]], vec![]]),
             preparatory: None,
+            driven: vec![[1.5, -2.25, 0.125]],
         };
         let blocked = Trace { scene: "c".into(), method: "n3p".into(), ..Trace::default() };
         let mut writer = TraceWriter::create(&path).unwrap();

@@ -514,7 +514,7 @@ impl Runner<'_> {
         bar.set_position(rows.len() as u64);
         let new = suite::run(&cases, &models, &suite_config, rows.len(), |case, episode| {
             bar.inc(1);
-            outputs.take(case, episode, &models).map_err(ExperimentError::from)
+            outputs.take(case, episode, &models, None).map_err(ExperimentError::from)
         })?;
         bar.finish_and_clear();
         rows.extend(new);

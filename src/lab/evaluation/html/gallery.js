@@ -44,6 +44,21 @@
     return { leg, share, pose: drive(leg.pose, leg.curvature, leg.length * share) };
   }
 
+  /** What was driven: its poses, each with how far the car had come. */
+  function drivenWay(run) {
+    let far = 0;
+    const poses = (run.driven ?? []).map((pose, i, all) => {
+      if (i) far += Math.hypot(pose[0] - all[i - 1][0], pose[1] - all[i - 1][1]);
+      return { pose, far };
+    });
+    return { poses, far };
+  }
+
+  /** Where the driven car was after a share of its way. */
+  function drivenAt({ poses, far }, share) {
+    return (poses.find((p) => p.far >= share * far) ?? poses.at(-1)).pose;
+  }
+
   const corner = ([x, y, heading], forward, left) => [
     x + forward * Math.cos(heading) - left * Math.sin(heading),
     y + forward * Math.sin(heading) + left * Math.cos(heading),
@@ -192,9 +207,15 @@
       drawFootprints(s, way, vehicle, footprints);
       drawWay(s, way, path, false);
     }
+    const driven = run ? drivenWay(run) : { poses: [] };
+    const ghost = driven.poses.length ? element("polygon", { class: "driven" }, layer("path")) : null;
+    if (ghost) {
+      const track = points(s, driven.poses.map((p) => p.pose));
+      element("polyline", { points: track, class: "driven" }, path);
+    }
     const car = drawCar(vehicle, layer("car"));
     if (way) drawChanges(s, way, layer("path"));
-    shown = { scene: s, run, vehicle, way, car };
+    shown = { scene: s, run, vehicle, way, car, driven, ghost };
     showLayers();
     showView();
     showRun();
@@ -251,13 +272,17 @@
 
   /** Puts the car where it is at `t` seconds. */
   function seek(t) {
-    const { way, vehicle, car, scene: s } = shown;
+    const { way, vehicle, car, scene: s, driven, ghost } = shown;
     state.time = way ? Math.max(0, Math.min(way.time, t)) : 0;
     const { pose, leg, share } = way?.all.length
       ? poseAt(way, state.time)
       : { pose: s.start, leg: null, share: 0 };
     const [x, y] = local(s, pose);
     car.setAttribute("transform", `translate(${x} ${y}) rotate(${(-pose[2] * 180) / Math.PI})`);
+    if (ghost) {
+      const there = drivenAt(driven, (leg.driven + Math.abs(leg.length) * share) / way.driven);
+      ghost.setAttribute("points", points(s, footprint(there, vehicle)));
+    }
     const steer = leg ? Math.atan(vehicle.wheelbase * leg.curvature) : 0;
     for (const wheel of car.front) wheel.setAttribute("transform", `rotate(${(-steer * 180) / Math.PI})`);
     const moving = state.playing || state.time > 0;

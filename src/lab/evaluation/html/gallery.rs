@@ -113,6 +113,9 @@ pub struct Run {
     pub regions: Option<[Vec<[f64; 2]>; 2]>,
     /// The preparatory pose.
     pub preparatory: Option<Pose>,
+    /// Where the car was when the path was driven.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub driven: Vec<[f64; 3]>,
 }
 
 impl Gallery {
@@ -165,6 +168,7 @@ impl Run {
             segments: trace.map(|t| t.segments.clone()).unwrap_or_default(),
             regions: trace.and_then(|t| t.regions.clone()),
             preparatory: trace.and_then(|t| t.preparatory),
+            driven: trace.map(|t| t.driven.clone()).unwrap_or_default(),
         }
     }
 

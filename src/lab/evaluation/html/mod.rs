@@ -199,6 +199,7 @@ mod tests {
             segments: vec![[1.0 / 7.0, -0.7], [0.0, 1.0 / 3.0]],
             regions: None,
             preparatory: Some(Pose::default()),
+            driven: vec![[0.1, 0.2, 0.3]],
         }];
         let html = whole_page(&cases, &rows, &traces);
         for raw in ["<img", "<b>own", "</script><"] {
