@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::turn::{Piece, Way, then};
+use super::turn::{Piece, Way, then, then_turned};
 use crate::geometry::{Pose, signed_angle};
 
 /// What a fitted path may miss its goal by, metres and radians.
@@ -14,6 +14,7 @@ const STEPS: usize = 12;
 /// where that takes a negative length, or more steps than usual.
 pub(super) fn fit(pieces: &mut [Piece], start: Pose, goal: Pose) -> bool {
     let mut ways: Vec<(Way, Way)> = Vec::with_capacity(pieces.len());
+    let mut poses: Vec<(Way, f64, f64)> = Vec::with_capacity(pieces.len());
     let mut columns: Vec<Vector3<f64>> = Vec::with_capacity(pieces.len());
     let mut clothoids: Vec<Option<[Way; 2]>> = vec![None; pieces.len()];
     let mut fixed = vec![false; pieces.len()];
@@ -26,8 +27,14 @@ pub(super) fn fit(pieces: &mut [Piece], start: Pose, goal: Pose) -> bool {
     for _ in 0..STEPS {
         ways.clear();
         ways.extend(pieces.iter().zip(&mut clothoids).map(|(piece, kept)| piece.way(kept)));
-        let whole =
-            ways.iter().fold([start.x, start.y, start.heading], |a, (way, _)| then(a, *way));
+        // Where each piece ends, and how the car stands where it begins.
+        poses.clear();
+        let mut whole = [start.x, start.y, start.heading];
+        for (way, _) in &ways {
+            let (sin, cos) = whole[2].sin_cos();
+            whole = then_turned(whole, (sin, cos), *way);
+            poses.push((whole, sin, cos));
+        }
         let miss = missed(whole, goal);
         if miss.amax() < EXACT {
             return true;
@@ -37,17 +44,13 @@ pub(super) fn fit(pieces: &mut [Piece], start: Pose, goal: Pose) -> bool {
         }
         let target = -Vector3::new(miss.x, miss.y, miss.z * radius);
         columns.clear();
-        let mut at = [start.x, start.y, start.heading];
-        for (piece, (way, change)) in pieces.iter().zip(&ways) {
-            let (sin, cos) = at[2].sin_cos();
-            let after = then(at, *way);
+        for ((piece, (_, change)), &(after, sin, cos)) in pieces.iter().zip(&ways).zip(&poses) {
             let rest = [whole[0] - after[0], whole[1] - after[1]];
             let dx = cos * change[0] - sin * change[1] - change[2] * rest[1];
             let dy = sin * change[0] + cos * change[1] + change[2] * rest[0];
             // Per metre: turns are measured along the tightest arc.
             let unit = if piece.is_straight() { 1.0 } else { tightest };
             columns.push(Vector3::new(dx, dy, change[2] * radius) * unit);
-            at = after;
         }
         if !step(pieces, &columns, &mut fixed, target, tightest) {
             return false;

@@ -27,7 +27,11 @@ pub(super) type Way = [f64; 3];
 
 /// `b` driven after `a`.
 pub(super) fn then(a: Way, b: Way) -> Way {
-    let (sin, cos) = a[2].sin_cos();
+    then_turned(a, a[2].sin_cos(), b)
+}
+
+/// [`then`] where sine and cosine of what `a` turned are known.
+pub(super) fn then_turned(a: Way, (sin, cos): (f64, f64), b: Way) -> Way {
     [a[0] + cos * b[0] - sin * b[1], a[1] + sin * b[0] + cos * b[1], a[2] + b[2]]
 }
 
@@ -105,9 +109,9 @@ impl Piece {
         let [begin, arc, end] = self.motions();
         let [begin, end] = *clothoids.get_or_insert_with(|| [begin.way(), end.way()]);
         let until = then(begin, arc.way());
-        let way = then(until, end);
         // The arc is longer: what follows moves along, and turns about where the arc ends.
         let (sin, cos) = until[2].sin_cos();
+        let way = then_turned(until, (sin, cos), end);
         let length = self.gear / peak;
         let turn = self.gear.copysign(self.curvature * self.gear);
         let rest = [way[0] - until[0], way[1] - until[1]];

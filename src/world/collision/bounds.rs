@@ -66,6 +66,12 @@ impl ConvexBounds {
     /// Whether the rear axle stays inside all along a clothoid.
     pub fn contains_clothoid(&self, start: Pose, motion: Clothoid) -> bool {
         let Clothoid { from, to, length } = motion;
+        // Within the length of the motion no side is ever reached.
+        let reach = length.abs();
+        let far = |(n, offset): &(Vec2, f64)| n.dot(&start.position()) + reach <= *offset;
+        if self.sides.iter().all(far) {
+            return true;
+        }
         let inside = |s: f64| self.contains(motion.at(start, s).position());
         // Farthest along a normal it is at an end, or where it heads across that normal.
         inside(0.0)
