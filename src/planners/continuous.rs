@@ -99,18 +99,19 @@ pub(super) fn deviation(problem: &Problem) -> f64 {
 
 /// The certificate of a smooth path: it begins at the start, keeps the steering limit and the bounds, and
 /// touches nothing: arcs that it is nowhere farther from than [`deviation`] keep the margin. Where it touches
-/// something, the first run on which it does is known.
+/// something, the last run on which it does is known.
 fn checked(
     problem: &Problem,
     path: SmoothPath,
     standstill: StandstillSteering,
 ) -> Result<SmoothPath, Option<usize>> {
     let arcs = path.arcs(deviation(problem), &problem.vehicle);
-    let mut run = 0;
-    let mut gear = arcs.segments.first().map(|s| s.gear());
-    for (from, segment) in arcs.legs() {
-        if gear != Some(segment.gear()) {
-            (run, gear) = (run + 1, Some(segment.gear()));
+    // The last first: near the goal space is tightest.
+    let legs: Vec<_> = arcs.legs().collect();
+    let mut run = arcs.direction_changes();
+    for (i, &(from, segment)) in legs.iter().enumerate().rev() {
+        if legs.get(i + 1).is_some_and(|(_, next)| next.gear() != segment.gear()) {
+            run -= 1;
         }
         if !problem.collision.segment_is_free(from, segment) {
             return Err(Some(run));
