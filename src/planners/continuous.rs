@@ -17,7 +17,7 @@ use crate::vehicle::Vehicle;
 const GENTLEST: f64 = 0.25;
 const SHARPEST: f64 = 0.0075;
 /// Fits for a path that ends straight.
-const WISHES: usize = 4;
+const WISHES: usize = 2;
 /// Expansions for a path that is free once it is smooth, and paths that are looked at.
 const EXPANSIONS: usize = 20_000;
 const PATHS: usize = 400;
