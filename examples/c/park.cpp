@@ -44,11 +44,14 @@ int main() try {
                 summary.direction_changes, summary.method, summary.route);
     std::printf("%zu poses\n", n3p::poses(plan).size());
 
-    n3p_limits limits = n3p_limits_default();
-    limits.stop_to_steer = 1;
-    std::vector<n3p_moment> moments(1000);
+    // A path for a car to follow: the steering angle does not jump while it drives.
+    n3p_options options = {};
+    options.standstill_steering = N3P_STEERING_AT_CHANGES;
+    const n3p::Parker follower = n3p::make_parker(n3p_vehicle_default(), &options);
+    const n3p::Plan smooth = n3p::plan(follower, start, goal, lot);
+    std::vector<n3p_moment> moments(2000);
     size_t count = 0;
-    n3p::check(n3p_plan_trajectory(plan.get(), &limits, moments.data(), moments.size(), &count));
+    n3p::check(n3p_plan_trajectory(smooth.get(), nullptr, moments.data(), moments.size(), &count));
     std::printf("%.1f s of driving in %zu moments\n", moments[count - 1].time, count);
 
     const double warm = median(2000, [&] { n3p::plan(parker, start, goal, lot); });

@@ -88,11 +88,6 @@ impl Clothoid {
         Self { from: self.from, to: self.curvature(s), length: s }
     }
 
-    /// What is left after the signed length `s`.
-    pub fn rest(self, s: f64) -> Self {
-        Self { from: self.curvature(s), to: self.to, length: self.length - s }
-    }
-
     /// Where it leads, seen from its start: metres ahead and to the left, and the turn in radians.
     pub(super) fn way(self) -> [f64; 3] {
         let Self { from, to, length } = self;
@@ -171,7 +166,8 @@ mod tests {
             assert!((end.heading - expected.heading).abs() < 1e-9);
             let halfway = c.part(0.4 * length).end(start);
             assert!(c.at(start, 0.4 * length).distance(halfway) < 1e-12);
-            assert!(c.rest(0.4 * length).end(halfway).distance(end) < 1e-9);
+            let rest = Clothoid { from: c.curvature(0.4 * length), to, length: 0.6 * length };
+            assert!(rest.end(halfway).distance(end) < 1e-9);
         }
     }
 

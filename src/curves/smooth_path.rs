@@ -62,11 +62,6 @@ impl SmoothPath {
         self.motions.windows(2).filter(|w| w[0].gear() != w[1].gear()).count()
     }
 
-    /// The largest |change of curvature| per metre, 1/m².
-    pub fn max_sharpness(&self) -> f64 {
-        self.motions.iter().map(|c| c.sharpness()).fold(0.0, f64::max)
-    }
-
     /// Whether it is made of arcs and straights alone.
     pub fn is_arcs(&self) -> bool {
         self.motions.iter().all(|c| c.is_arc())
@@ -97,20 +92,6 @@ impl SmoothPath {
             start: frame.world_from_local(self.start),
             motions: self.motions.iter().map(flip).collect(),
         }
-    }
-
-    /// The path to the arc length `length`, metres.
-    pub fn up_to(&self, length: f64) -> Self {
-        let mut left = length;
-        let mut motions = Vec::new();
-        for &c in &self.motions {
-            if left <= 0.0 {
-                break;
-            }
-            motions.push(if c.length.abs() <= left { c } else { c.part(left.copysign(c.length)) });
-            left -= c.length.abs();
-        }
-        Self { start: self.start, motions }
     }
 
     /// Poses at most `step` metres apart, and half a radian, every border of a motion included. Where the

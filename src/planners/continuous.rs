@@ -164,8 +164,11 @@ pub(super) fn driven(
     if let Some(shaped) = shaped(problem, &result, terms) {
         return shaped;
     }
-    // Another path may be one that is free when it is smooth.
     let standstill = terms.standstill;
+    if standstill == StandstillSteering::Anywhere {
+        return result;
+    }
+    // Another path may be one that is free when it is smooth.
     let share = budget.max_expansions.saturating_sub(result.expansions).min(EXPANSIONS);
     let (mut spend, mut looks, mut found) = (share, PATHS, None);
     if result.covered.is_none() {
@@ -177,9 +180,8 @@ pub(super) fn driven(
     }
     let expansions = result.expansions + share - spend;
     let Some(smooth) = found else { return PlanResult::none(NoPath::NotSmooth, expansions) };
-    let route = if spend < share { Some(Route::Searched) } else { None };
-    let guidance =
-        result.guidance.map(|g| Guidance { preparatory: None, route: route.unwrap_or(g.route) });
+    let searched = Guidance { preparatory: None, route: Route::Searched };
+    let guidance = result.guidance.map(|_| searched);
     with_smooth(problem, PlanResult { expansions, guidance, ..result }, smooth)
 }
 

@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 use std::{env, fs};
 
 use n3p::curves::TrajectoryLimits;
+use n3p::curves::smoothing::StandstillSteering;
 use n3p::geometry::Pose;
 use n3p::world::Scene;
 use n3p::{Lot, Parker, PlanError, Vehicle};
@@ -42,8 +43,10 @@ fn from_polygons() -> Result<(), Box<dyn Error>> {
     let (length, changes) = (plan.length(), plan.direction_changes());
     println!("{length:.2} m with {changes} changes of direction by {}", plan.method());
     println!("{} poses", plan.poses().poses.len());
-    let limits = TrajectoryLimits { stop_to_steer: true, ..Default::default() };
-    let driven = plan.trajectory(&limits)?;
+    // A path for a car to follow: the steering angle does not jump while it drives.
+    let follower = Parker::new(Vehicle::default())?;
+    let follower = follower.standstill_steering(StandstillSteering::AtChanges);
+    let driven = follower.plan(start, goal, &lot)?.trajectory(&TrajectoryLimits::default())?;
     let end = driven.moments.last().ok_or("a path has an end")?;
     println!("{:.1} s of driving in {} moments", end.time, driven.moments.len());
 

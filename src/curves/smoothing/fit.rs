@@ -21,7 +21,9 @@ pub(super) fn fit(pieces: &mut [Piece], start: Pose, goal: Pose) -> bool {
     // Angles in metres: as the tightest turn sweeps them.
     let tightest = pieces.iter().map(|p| p.curvature.abs()).fold(0.0, f64::max);
     if tightest == 0.0 {
-        return miss(pieces, start, goal).is_some_and(|m| m.amax() < EXACT);
+        let start = [start.x, start.y, start.heading];
+        let end = pieces.iter().fold(start, |a, piece| then(a, piece.way(&mut None).0));
+        return missed(end, goal).amax() < EXACT;
     }
     let radius = 1.0 / tightest;
     for _ in 0..STEPS {
@@ -120,11 +122,7 @@ fn step(
     false
 }
 
+/// How far the end of a way is from `goal`, metres and radians.
 fn missed(whole: Way, goal: Pose) -> Vector3<f64> {
     Vector3::new(whole[0] - goal.x, whole[1] - goal.y, signed_angle(goal.heading, whole[2]))
-}
-
-fn miss(pieces: &[Piece], start: Pose, goal: Pose) -> Option<Vector3<f64>> {
-    let start = [start.x, start.y, start.heading];
-    Some(missed(pieces.iter().fold(start, |a, piece| then(a, piece.way(&mut None).0)), goal))
 }

@@ -18,7 +18,6 @@ use serde::{Deserialize, Serialize};
 use super::smooth_path::jumps;
 use super::{Clothoid, Path, Segment, SmoothPath};
 use crate::geometry::Pose;
-use crate::vehicle::Vehicle;
 use turn::Piece;
 
 /// Where the steering wheel may be turned while the car stands.
@@ -75,14 +74,6 @@ pub struct Smoothing<'a> {
     pub sharpness: &'a [f64],
     /// The least length of the straight that the path ends with, metres; 0 for any end.
     pub last_straight: f64,
-}
-
-impl Smoothing<'_> {
-    /// The sharpness at which a car of so many m/s turns its wheels as fast as it can: at δ = 0, where
-    /// the wheels turn fastest, dδ/ds = L·dκ/ds for the wheelbase L.
-    pub fn sharpness_at(vehicle: &Vehicle, speed: f64) -> f64 {
-        vehicle.steer_rate / (vehicle.wheelbase * speed)
-    }
 }
 
 /// `path` with clothoids in place of its jumps of curvature, from the same start to `goal`; `None` where
