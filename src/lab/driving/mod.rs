@@ -1,7 +1,7 @@
 //! Driven, not only planned: what becomes of a plan in a car with lags and errors.
 //!
-//! A plan's trajectory is driven in closed loop by an ordinary controller ([`controller`]) in a car whose
-//! wheels and speed lag behind their commands ([`car`]). The car knows where it is only by a localisation with
+//! A plan's trajectory is driven in closed loop by an ordinary controller (`controller`) in a car whose
+//! wheels and speed lag behind their commands (`car`). The car knows where it is only by a localisation with
 //! errors, smoothed with its odometry, and the obstacles stand a little elsewhere than where they were seen.
 //! [`drive`] says where the car ended, how far it was from its path, and whether it touched anything.
 
