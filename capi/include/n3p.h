@@ -64,6 +64,25 @@ typedef enum n3p_effort {
 } n3p_effort;
 
 /**
+ * Where the steering wheel may be turned while the car stands. Elsewhere it turns as the car drives, and
+ * the steering angle is continuous.
+ */
+typedef enum n3p_standstill_steering {
+    /**
+     * Wherever the curvature jumps: paths are arcs and straights.
+     */
+    N3P_STEERING_ANYWHERE = 0,
+    /**
+     * Where the gear changes, and at the start where nothing else fits.
+     */
+    N3P_STEERING_AT_CHANGES = 1,
+    /**
+     * Nowhere.
+     */
+    N3P_STEERING_NEVER = 2,
+} n3p_standstill_steering;
+
+/**
  * How the goal lies in its spot.
  */
 typedef enum n3p_parking_type {

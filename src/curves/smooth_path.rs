@@ -101,7 +101,9 @@ impl SmoothPath {
         const TURN: f64 = 0.5;
         const ASIDE: f64 = 2e-6;
         let step = Path::LEAST_STEP.max(step);
-        let mut out = Vec::new();
+        // About as many as arcs take, so that the vector hardly grows.
+        let about = (self.length() / step).min(1e5) as usize + 2 * self.motions.len() + 1;
+        let mut out = Vec::with_capacity(about);
         let mut last = Clothoid::default();
         let at = |p: Pose| Pose::new(p.x, p.y, wrap_angle(p.heading));
         for (from, c) in self.legs() {

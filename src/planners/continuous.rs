@@ -41,6 +41,8 @@ struct Wanted {
 fn smoothed(problem: &Problem, path: &Path, wanted: Wanted) -> Option<SmoothPath> {
     let starts: &[bool] = match wanted.standstill {
         StandstillSteering::Never => &[false],
+        // Straight wheels at the start are worth more than a straight end.
+        StandstillSteering::AtChanges if wanted.last_straight > 0.0 => &[false],
         StandstillSteering::AtChanges => &[false, true],
         // Wheels that turn anywhere need no clothoids.
         StandstillSteering::Anywhere => &[true],

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::curves::smoothing::StandstillSteering;
 use crate::environment::courses::Course;
 use crate::lab::dataset::{CollectConfig, Subset};
 use crate::lab::evaluation::SuiteConfig;
@@ -150,6 +151,9 @@ pub struct EvaluateConfig {
     /// What becomes of first paths.
     #[serde(default)]
     pub effort: Effort,
+    /// Where the steering wheel may be turned while the car stands.
+    #[serde(default, skip_serializing_if = "is_anywhere")]
+    pub standstill_steering: StandstillSteering,
     /// Settings of every search.
     #[serde(default)]
     pub planner: HybridAStarConfig,
@@ -190,10 +194,15 @@ impl EvaluateConfig {
             methods: methods.to_vec(),
             settings: MethodSettings { planner: self.planner, n3p: self.n3p, rl: self.rl },
             budget: self.budget(),
-            terms: Terms::default(),
+            terms: Terms { standstill: self.standstill_steering, ..Terms::default() },
             threads: 1,
         }
     }
+}
+
+/// Left out of files where it is as usual, so that those of before stay what they are.
+fn is_anywhere(standstill: &StandstillSteering) -> bool {
+    *standstill == StandstillSteering::Anywhere
 }
 
 fn all_types() -> Vec<ParkingType> {

@@ -380,7 +380,8 @@ impl Runner<'_> {
             let file = folder.join("points.json");
             let (c, e) = (self.config, &self.config.evaluate);
             let scenes = (&curve.methods, curve.count, curve.seed, &c.vehicle, &e.generator);
-            let planning = (&e.types, &e.levels, e.max_expansions, e.effort, &e.planner, &e.n3p);
+            let work = (e.max_expansions, e.effort, e.standstill_steering);
+            let planning = (&e.types, &e.levels, work, &e.planner, &e.n3p);
             let settings = settings((&stage, data, part, scenes, planning, &c.train.mlp));
             let known = read_points(&file);
             let todo = self.stages.begin(&stage, &settings, known.is_some())?;
