@@ -1,5 +1,5 @@
-//! How long do Reeds-Shepp queries take: the shortest length alone, and all words in
-//! order of length?
+//! How long do Reeds-Shepp queries take: the shortest length alone, all words in
+//! order of length, and clothoids fitted to the shortest word?
 //!
 //! One query each, over a thousand fixed pairs of poses up to 28 m apart.
 
@@ -9,7 +9,9 @@ use std::f64::consts::PI;
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use n3p::curves::Path;
 use n3p::curves::reeds_shepp::{shortest_length, words};
+use n3p::curves::smoothing::{Smoothing, smooth};
 use n3p::geometry::Pose;
 use n3p::rng::{Stream, rng};
 use n3p::vehicle::Vehicle;
@@ -43,6 +45,25 @@ fn bench(c: &mut Criterion) {
             words(black_box(from), black_box(to), radius, &mut found);
             found.sort_by(|a, b| a.length().total_cmp(&b.length()));
             found.len()
+        });
+    });
+    let curves: Vec<Path> = pairs
+        .iter()
+        .map(|&(from, to)| {
+            found.clear();
+            words(from, to, radius, &mut found);
+            let shortest = found.iter().min_by(|a, b| a.length().total_cmp(&b.length()));
+            Path::new(from, shortest.expect("there is one").segments().iter().copied())
+        })
+        .collect();
+    let mut next = curves.iter().cycle();
+    let (turned_at_changes, sharpness) = (true, &[4.0 / (radius * radius)]);
+    let smoothing =
+        Smoothing { turned_at_start: false, turned_at_changes, sharpness, last_straight: 0.0 };
+    group.bench_function("smooth", |b| {
+        b.iter(|| {
+            let path = next.next().expect("endless");
+            smooth(black_box(path), path.end(), &smoothing)
         });
     });
     group.finish();
