@@ -18,7 +18,6 @@ use crate::n3p::{Driver, MethodSettings, more};
 use crate::planners::cost::CostModel;
 use crate::planners::goals::Terms;
 use crate::planners::{HybridAStarConfig, Problem, Shape};
-use crate::vehicle::Vehicle;
 
 /// Exit code of a planner that found no path.
 pub const EXIT_NO_PATH: u8 = 3;
@@ -148,18 +147,8 @@ impl TermsArgs {
     /// The terms; arcs, where nothing else is asked for.
     pub fn terms(&self) -> Terms {
         let standstill = self.standstill_steering.unwrap_or_default();
-        Terms { margin: self.margin, contact: self.allow_contact, standstill, shape: None }
-    }
-
-    /// The same with the shape that was asked for, the rest as is usual for `vehicle`.
-    pub fn shaped(&self, terms: Terms, vehicle: &Vehicle) -> Terms {
-        let Shape { least_move, last_straight } = terms.shape_for(vehicle);
-        let shape = Shape {
-            least_move: self.least_move.unwrap_or(least_move),
-            last_straight: self.last_straight.unwrap_or(last_straight),
-        };
-        let is_asked = self.least_move.is_some() || self.last_straight.is_some();
-        Terms { shape: is_asked.then_some(shape), ..terms }
+        let shape = Shape { least_move: self.least_move, last_straight: self.last_straight };
+        Terms { margin: self.margin, contact: self.allow_contact, standstill, shape }
     }
 }
 

@@ -33,7 +33,7 @@
 //! - `toml_file` (feature `scene`): files of settings
 //! - [`geometry`]: poses, frames, polygons
 //! - [`vehicle`]: dimensions, footprint, kinematics
-//! - [`curves`]: segments, paths, Reeds-Shepp words
+//! - [`curves`]: segments, paths, Reeds-Shepp words, clothoids, trajectories
 //! - [`world`]: scenes, exact swept collision, cells, the abstraction, generators (feature `generate`)
 //! - [`planners`]: the `Planner` trait and Hybrid A* with Reeds-Shepp expansion
 //! - [`selectors`]: preparatory poses and manoeuvres: by KNN, by MLP, across vehicles

@@ -140,10 +140,9 @@ impl Parker {
         Ok(self)
     }
 
-    /// The same with other lengths asked of moves and of the straight at the end; else those are that are usual:
-    /// see [`Terms::shape`].
+    /// The same with other lengths asked of moves and of the straight at the end; see [`Shape`] for what is usual.
     pub fn shape(self, shape: Shape) -> Result<Self, ParkerError> {
-        Self { terms: Terms { shape: Some(shape), ..self.terms }, ..self }.checked()
+        Self { terms: Terms { shape, ..self.terms }, ..self }.checked()
     }
 
     /// The same by other costs: what a plan prefers, such as fewer changes of gear to a short way.

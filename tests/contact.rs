@@ -12,6 +12,7 @@ use n3p::output::PathFile;
 use n3p::planners::goals::{self, Planned, Terms};
 use n3p::planners::{
     Budget, HybridAStar, HybridAStarConfig, NoPath, PlanResult, Planner, Problem, ProblemError,
+    Shape,
 };
 use n3p::vehicle::Vehicle;
 use n3p::world::collision::CollisionWorld;
@@ -27,7 +28,7 @@ const TERMS: Terms = Terms {
     margin: Problem::MARGIN,
     contact: ALLOWED,
     standstill: StandstillSteering::Anywhere,
-    shape: None,
+    shape: Shape { least_move: None, last_straight: None },
 };
 const PILLAR: &str = "tests/fixtures/goals/beside-a-pillar.json";
 

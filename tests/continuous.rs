@@ -333,7 +333,7 @@ fn moves_are_long_and_ends_are_straight_where_there_is_room() {
     let mut planner = Method::N3P.build(&models, &MethodSettings::default()).unwrap();
     let mut counts = [[0; 3]; 2];
     for scene in home(8) {
-        for (i, shape) in [Some(Shape::default()), None].into_iter().enumerate() {
+        for (i, shape) in [Shape::ANY, Shape::default()].into_iter().enumerate() {
             let terms = Terms { shape, ..terms(StandstillSteering::AtChanges) };
             let planned = goals::plan(planner.as_mut(), &scene, terms, BUDGET).unwrap();
             let Some(path) = planned.result.smooth else { continue };

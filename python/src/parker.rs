@@ -7,7 +7,6 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 
 use n3p::planners::cost::CostModel;
-use n3p::planners::goals::Terms;
 use n3p::planners::{Budget, Effort, Shape};
 use n3p::{Method, Models, world};
 
@@ -134,20 +133,13 @@ impl Parker {
     ) -> Result<Self, Fault> {
         let vehicle = self::vehicle(vehicle)?;
         let standstill = inputs::standstill(standstill_steering)?;
-        let terms = Terms { standstill, ..Terms::default() };
-        let usual = terms.shape_for(&vehicle);
         let method = self::method(method, "method")?;
         let settings = Settings { models, effort, max_expansions };
         let (models, budget) = (settings.models(&[method], &vehicle)?, settings.budget()?);
         let made = py.detach(|| guarded(|| n3p::Parker::by(method, vehicle, models)))?;
         let mut made = made?.margin(margin)?.allow_contact(allow_contact)?.budget(budget);
         made = made.standstill_steering(standstill);
-        if least_move.is_some() || last_straight.is_some() {
-            made = made.shape(Shape {
-                least_move: least_move.unwrap_or(usual.least_move),
-                last_straight: last_straight.unwrap_or(usual.last_straight),
-            })?;
-        }
+        made = made.shape(Shape { least_move, last_straight })?;
         if let Some(cost) = cost {
             let value = json::value(cost, "cost")?;
             let cost: CostModel =

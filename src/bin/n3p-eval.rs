@@ -163,9 +163,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
         },
         settings: args.cost.settings()?,
         budget: Budget { max_expansions: args.max_expansions, effort: args.effort },
-        terms: args
-            .terms
-            .shaped(args.terms.terms(), &vehicle.or(models.vehicle()).unwrap_or_default()),
+        terms: args.terms.terms(),
         threads: args.threads.into(),
     };
     if args.policy.is_given() && !config.methods.contains(&Method::POLICY) {

@@ -186,7 +186,6 @@ fn plan(args: &Args) -> Result<ExitCode> {
     let usual = EpisodeConfig::new(budget);
     // Who drives a path wants one that can be driven without stops to steer.
     let terms = Terms { standstill: args.standstill(), ..terms };
-    let terms = args.terms.shaped(terms, &case.scene.vehicle);
     let once = EpisodeConfig { repeats: 0, terms, ..usual };
     let mut episode = episode::run(&case, planner.as_mut(), &once, &JUDGE)?;
     let is_not_smooth = episode.result.outcome.as_ref().err() == Some(&NoPath::NotSmooth);

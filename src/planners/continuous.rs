@@ -6,7 +6,7 @@
 
 use super::hybrid_astar::HybridAStar;
 use super::problem::Terms;
-use super::shape::{Shape, ended_straight, lengthened};
+use super::shape::{ended_straight, lengthened};
 use super::{Budget, Guidance, NoPath, PlanResult, Planner, Problem, Route, keeps_limits};
 use crate::curves::smoothing::{Smoothing, StandstillSteering, smooth};
 use crate::curves::{Path, SmoothPath};
@@ -37,8 +37,21 @@ struct Wanted {
     last_straight: f64,
 }
 
+/// A smooth path, and the arcs by which it was checked.
+struct Driven {
+    smooth: SmoothPath,
+    arcs: Path,
+}
+
+impl Driven {
+    /// The result with this path.
+    fn in_place_of(self, result: PlanResult) -> PlanResult {
+        PlanResult { outcome: Ok(self.arcs), smooth: Some(self.smooth), ..result }
+    }
+}
+
 /// `path` with clothoids, if it can be driven so, with straight wheels at the start if possible.
-fn smoothed(problem: &Problem, path: &Path, wanted: Wanted) -> Option<SmoothPath> {
+fn smoothed(problem: &Problem, path: &Path, wanted: Wanted) -> Option<Driven> {
     let starts: &[bool] = match wanted.standstill {
         StandstillSteering::Never => &[false],
         // Straight wheels at the start are worth more than a straight end.
@@ -57,7 +70,7 @@ fn smoothed_from(
     path: &Path,
     turned_at_start: bool,
     wanted: Wanted,
-) -> Option<SmoothPath> {
+) -> Option<Driven> {
     let Wanted { standstill, last_straight } = wanted;
     let choice = match standstill {
         StandstillSteering::Anywhere => vec![f64::INFINITY],
@@ -76,7 +89,7 @@ fn smoothed_from(
         let smoothing = Smoothing { turned_at_start, turned_at_changes, sharpness, last_straight };
         let smooth = smooth(path, goal, &smoothing);
         let touching = match smooth.map(|smooth| checked(problem, smooth, standstill)) {
-            Some(Ok(smooth)) => return Some(smooth),
+            Some(Ok(driven)) => return Some(driven),
             Some(Err(touching)) => touching,
             None => None,
         };
@@ -92,7 +105,7 @@ fn smoothed_from(
 
 /// How far the car may come from where the exact check sees it, metres: half of the margin, if there is one,
 /// and else what no contact is noticed by.
-pub(super) fn deviation(problem: &Problem) -> f64 {
+fn deviation(problem: &Problem) -> f64 {
     const LEAST: f64 = 1e-4;
     let scale = problem.vehicle.scale();
     (problem.margin / 2.0)
@@ -106,7 +119,7 @@ fn checked(
     problem: &Problem,
     path: SmoothPath,
     standstill: StandstillSteering,
-) -> Result<SmoothPath, Option<usize>> {
+) -> Result<Driven, Option<usize>> {
     let arcs = path.arcs(deviation(problem), &problem.vehicle);
     // The last first: near the goal space is tightest.
     let legs: Vec<_> = arcs.legs().collect();
@@ -124,14 +137,14 @@ fn checked(
         && problem.collision.pose_is_free(path.start)
         && keeps_limits(problem, &arcs)
         && problem.collision.stays_within_bounds(&path);
-    if is_kept { Ok(path) } else { Err(None) }
+    if is_kept { Ok(Driven { smooth: path, arcs }) } else { Err(None) }
 }
 
 /// A planner's result with its moves as long, its end as straight and its path as smooth as `terms` ask for, if
 /// it can be driven so; what is asked of its shape only where there is room for it.
 fn shaped(problem: &Problem, result: &PlanResult, terms: &Terms) -> Option<PlanResult> {
     let path = result.outcome.as_ref().ok()?;
-    let Shape { least_move, last_straight } = terms.shape_for(&problem.vehicle);
+    let [least_move, last_straight] = terms.lengths(&problem.vehicle);
     let standstill = terms.standstill;
     let any_end = Wanted { standstill, last_straight: 0.0 };
     // Who stops anywhere near the goal has no end to be straight, and who is there already stays.
@@ -144,12 +157,10 @@ fn shaped(problem: &Problem, result: &PlanResult, terms: &Terms) -> Option<PlanR
     if longer != *path {
         ways.push((path, any_end));
     }
-    let smooth = ways.into_iter().find_map(|(path, wanted)| smoothed(problem, path, wanted))?;
-    if standstill != StandstillSteering::Anywhere {
-        return Some(with_smooth(problem, result.clone(), smooth));
-    }
-    let arcs = smooth.arcs(deviation(problem), &problem.vehicle);
-    Some(PlanResult { outcome: Ok(arcs), ..result.clone() })
+    let driven = ways.into_iter().find_map(|(path, wanted)| smoothed(problem, path, wanted))?;
+    let result = driven.in_place_of(result.clone());
+    let smooth = result.smooth.filter(|_| standstill != StandstillSteering::Anywhere);
+    Some(PlanResult { smooth, ..result })
 }
 
 /// A planner's result as `terms` ask for it; where its path cannot be driven so, another that can.
@@ -181,13 +192,8 @@ pub(super) fn driven(
         });
     }
     let expansions = result.expansions + share - spend;
-    let Some(smooth) = found else { return PlanResult::none(NoPath::NotSmooth, expansions) };
+    let Some(driven) = found else { return PlanResult::none(NoPath::NotSmooth, expansions) };
     let searched = Guidance { preparatory: None, route: Route::Searched };
     let guidance = result.guidance.map(|_| searched);
-    with_smooth(problem, PlanResult { expansions, guidance, ..result }, smooth)
-}
-
-fn with_smooth(problem: &Problem, result: PlanResult, smooth: SmoothPath) -> PlanResult {
-    let arcs = smooth.arcs(deviation(problem), &problem.vehicle);
-    PlanResult { outcome: Ok(arcs), smooth: Some(smooth), ..result }
+    driven.in_place_of(PlanResult { expansions, guidance, ..result })
 }

@@ -6,7 +6,8 @@
 //! heuristics), [`analytic`] (Reeds-Shepp expansion) and [`cost`]. Its variants are
 //! [`PlainHybridAStar`] (no curves), [`MultiHeuristicHybridAStar`] and
 //! [`ScenarioHybridAStar`] (parallel spots). [`goals`] plans a scene with any of them: to the
-//! cheapest of its goals, and out of a contact (`contact`). [`library`] does without any search; `approach`
+//! cheapest of its goals, and out of a contact (`contact`); `continuous` makes its path one that a car can
+//! follow, of the `shape` asked for. [`library`] does without any search; `approach`
 //! estimates the ways to its manoeuvres.
 
 pub mod analytic;

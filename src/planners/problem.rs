@@ -50,24 +50,24 @@ pub struct Terms {
     pub contact: f64,
     /// Where the steering wheel may be turned while the car stands.
     pub standstill: StandstillSteering,
-    /// The shape of paths; without it what is usual: nothing for arcs, [`Shape::usual`] for paths that are to
-    /// be followed.
-    pub shape: Option<Shape>,
+    /// The shape of paths.
+    pub shape: Shape,
 }
 
 impl Terms {
     /// Whether paths are taken as planners make them: arcs and straights of any shape.
     pub(super) fn are_usual(&self) -> bool {
-        self.standstill == StandstillSteering::Anywhere && self.shape.is_none()
+        self.standstill == StandstillSteering::Anywhere && self.shape == Shape::default()
     }
 
-    /// What is asked of the shape of a path.
-    pub fn shape_for(&self, vehicle: &Vehicle) -> Shape {
+    /// The least length of a move and of the straight at the end that are asked for, metres.
+    pub(super) fn lengths(&self, vehicle: &Vehicle) -> [f64; 2] {
         let usual = match self.standstill {
-            StandstillSteering::Anywhere => Shape::default(),
-            _ => Shape::usual(vehicle),
+            StandstillSteering::Anywhere => [0.0, 0.0],
+            _ => [0.3, 0.5].map(|metres| metres * vehicle.scale()),
         };
-        self.shape.unwrap_or(usual)
+        let Shape { least_move, last_straight } = self.shape;
+        [least_move.unwrap_or(usual[0]), last_straight.unwrap_or(usual[1])]
     }
 
     /// Checks every number.
@@ -78,10 +78,9 @@ impl Terms {
         if !(0.0..=Problem::MAX_CONTACT).contains(&self.contact) {
             return Err(ProblemError::Contact(self.contact));
         }
-        let shape = self.shape.unwrap_or_default();
-        for (field, value) in
-            [("least_move", shape.least_move), ("last_straight", shape.last_straight)]
-        {
+        let Shape { least_move, last_straight } = self.shape;
+        for (field, value) in [("least_move", least_move), ("last_straight", last_straight)] {
+            let value = value.unwrap_or(0.0);
             if !(0.0..=Shape::MOST).contains(&value) {
                 return Err(ProblemError::Shape(field, value));
             }
@@ -94,7 +93,7 @@ impl Default for Terms {
     /// The usual margin, no contact, and arcs.
     fn default() -> Self {
         let standstill = StandstillSteering::Anywhere;
-        Self { margin: Problem::MARGIN, contact: 0.0, standstill, shape: None }
+        Self { margin: Problem::MARGIN, contact: 0.0, standstill, shape: Shape::default() }
     }
 }
 

@@ -2,27 +2,23 @@
 
 use super::Problem;
 use crate::curves::{Path, Segment};
-use crate::vehicle::Vehicle;
 
-/// What is asked of the shape of a path, where there is room for it.
+/// What is asked of the shape of a path, where there is room for it. What is left out is as usual: nothing of
+/// arcs, 0.3 m and 0.5 m of paths that a default vehicle is to follow.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Shape {
     /// The least length of a move, from one change of gear to the next, metres.
-    pub least_move: f64,
+    pub least_move: Option<f64>,
     /// The least length of the straight that a path ends with, metres.
-    pub last_straight: f64,
+    pub last_straight: Option<f64>,
 }
 
 impl Shape {
+    /// Nothing is asked.
+    pub const ANY: Self = Self { least_move: Some(0.0), last_straight: Some(0.0) };
+
     /// The longest of each that can be asked for, metres.
     pub const MOST: f64 = 5.0;
-
-    /// What is asked of paths that a car is to follow, unless something else is: 0.3 m and 0.5 m for the
-    /// default vehicle.
-    pub fn usual(vehicle: &Vehicle) -> Self {
-        let scale = vehicle.scale();
-        Self { least_move: 0.3 * scale, last_straight: 0.5 * scale }
-    }
 }
 
 /// `path` with its short moves made longer, each where there is room: the car drives on beyond the change of

@@ -60,8 +60,8 @@ pub struct Vehicle {
     pub steer_rate: f64,
 }
 
-fn default_steer_rate() -> f64 {
-    0.6
+const fn default_steer_rate() -> f64 {
+    Vehicle::STEER_RATE
 }
 
 fn is_default_steer_rate(rate: &f64) -> bool {
@@ -104,6 +104,9 @@ pub struct VehicleError {
 }
 
 impl Vehicle {
+    /// How fast the front wheels of a usual car turn, rad/s.
+    pub const STEER_RATE: f64 = 0.6;
+
     /// Checks every field.
     pub fn validate(&self) -> Result<(), VehicleError> {
         let check = |field, value: f64, ok: bool, expected| {

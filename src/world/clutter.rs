@@ -35,7 +35,6 @@ const fn vehicle(
     max_steer: f64,
     [forward_speed, backward_speed]: [f64; 2],
 ) -> Vehicle {
-    let [forward_speed, backward_speed, steer_rate] = [forward_speed, backward_speed, 0.6];
     Vehicle {
         length,
         width,
@@ -44,7 +43,7 @@ const fn vehicle(
         max_steer,
         forward_speed,
         backward_speed,
-        steer_rate,
+        steer_rate: Vehicle::STEER_RATE,
     }
 }
 
