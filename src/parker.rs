@@ -379,8 +379,6 @@ impl Lot {
     pub fn scene(&self, vehicle: Vehicle, request: &Request) -> Scene {
         let first = request.goals.first().copied();
         Scene {
-            name: String::new(),
-            source: String::new(),
             vehicle,
             start: request.start,
             goal: first.unwrap_or(Pose::new(f64::NAN, f64::NAN, f64::NAN)),
@@ -390,6 +388,7 @@ impl Lot {
             obstacles: self.outlines.clone(),
             points: self.points.clone(),
             bounds: self.bounds,
+            ..Scene::default()
         }
     }
 }

@@ -22,16 +22,12 @@ const BUDGET: Budget = Budget::new(200_000);
 fn ahead(obstacles: Vec<Vec<[f64; 2]>>, points: Vec<[f64; 2]>) -> Scene {
     Scene {
         name: "ahead".to_owned(),
-        source: String::new(),
         vehicle: Vehicle::default(),
         start: Pose::new(0.0, 0.0, 0.0),
         goal: Pose::new(20.0, 0.0, 0.0),
-        goals: Vec::new(),
-        goal_tolerance: None,
-        parking_type: None,
         obstacles,
         points,
-        bounds: None,
+        ..Scene::default()
     }
 }
 

@@ -202,16 +202,11 @@ fn narrow_doors_and_long_ways_round_are_found() {
     };
     let scene = |vehicle, start, goal, obstacles| Scene {
         name: "own".to_owned(),
-        source: String::new(),
         vehicle,
         start,
         goal,
-        goals: Vec::new(),
-        goal_tolerance: None,
-        parking_type: None,
         obstacles,
-        points: vec![],
-        bounds: None,
+        ..Scene::default()
     };
     let wall = |x0: f64, y0: f64, x1: f64, y1: f64| vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
     for shift in 0..10 {

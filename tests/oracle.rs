@@ -19,16 +19,11 @@ fn block(x0: f64, y0: f64, x1: f64, y1: f64) -> Vec<[f64; 2]> {
 fn around(path: &Path, obstacles: Vec<Vec<[f64; 2]>>) -> (Scene, PathFile) {
     let scene = Scene {
         name: "hand-made".into(),
-        source: String::new(),
         vehicle: Vehicle::default(),
         start: path.start,
         goal: path.end(),
-        goals: Vec::new(),
-        goal_tolerance: None,
-        parking_type: None,
         obstacles,
-        points: vec![],
-        bounds: None,
+        ..Scene::default()
     };
     let file = PathFile::new(&scene, &Frame::WORLD, path, "by-hand");
     (scene, file)
@@ -144,7 +139,7 @@ fn rejects_a_point_under_the_car() {
     scene.points = vec![[50.0, 0.0], [6.0, 0.5]];
     let verdict = oracle::check(&scene, &file);
     let Err(Violation::Collision { obstacle, .. }) = verdict else { panic!("{verdict:?}") };
-    assert_eq!(obstacle, "point 1");
+    assert_eq!(obstacle, "points[1]");
     scene.points = vec![[6.0, 1.03]];
     assert!((oracle::check(&scene, &file).unwrap() - 0.1).abs() < 1e-9);
 }

@@ -1,6 +1,6 @@
 //! How near a path comes to the obstacles of its scene.
 
-use crate::geometry::{Aabb, Pose, Vec2, distance_to_segment, segment_in_box};
+use crate::geometry::{Aabb, Pose, Vec2, distance_to_segment, is_within, segment_in_box};
 use crate::output::PathFile;
 use crate::world::Scene;
 
@@ -21,12 +21,15 @@ pub struct Clearance {
 /// How near `path` comes to the obstacles of its scene, over its poses.
 pub fn of(scene: &Scene, path: &PathFile) -> Clearance {
     let body = scene.vehicle.footprint(0.0);
-    let corner = |p: &[f64; 2]| Vec2::new(p[0], p[1]);
-    let mut edges: Vec<[Vec2; 2]> = scene.points.iter().map(|p| [corner(p); 2]).collect();
-    for outline in &scene.obstacles {
-        let next = outline.iter().cycle().skip(1);
-        edges.extend(outline.iter().zip(next).map(|(a, b)| [corner(a), corner(b)]));
-    }
+    let wheels = scene.vehicle.wheel_box(0.0);
+    let contour: Vec<Vec2> = scene.contour.iter().map(|&[x, y]| Vec2::new(x, y)).collect();
+    let edges: Vec<(&Aabb, [Vec2; 2], bool)> = scene
+        .outlines()
+        .flat_map(|o| {
+            let part = if o.is_low { &wheels } else { &body };
+            o.edges().map(move |(a, b)| (part, [a, b], o.is_low)).collect::<Vec<_>>()
+        })
+        .collect();
     let poses: Vec<Pose> = path.poses.iter().map(|&p| p.into()).collect();
     let mut driven = vec![0.0];
     for pair in poses.windows(2) {
@@ -37,8 +40,15 @@ pub fn of(scene: &Scene, path: &PathFile) -> Clearance {
     let (mut least, mut on_the_way) = (f64::INFINITY, f64::INFINITY);
     for (pose, driven) in poses.into_iter().zip(driven) {
         let to_body = |p: Vec2| pose.point_to_local(p);
-        let here =
-            edges.iter().map(|e| distance(&body, e.map(to_body))).fold(f64::INFINITY, f64::min);
+        let mut here = f64::INFINITY;
+        for &(part, edge, is_low) in &edges {
+            let edge = edge.map(to_body);
+            let box_distance = distance(part, edge);
+            if box_distance < here {
+                let is_refined = !is_low && !contour.is_empty();
+                here = here.min(if is_refined { apart(&contour, edge) } else { box_distance });
+            }
+        }
         least = least.min(here);
         if way.contains(&driven) {
             on_the_way = on_the_way.min(here);
@@ -61,6 +71,23 @@ fn distance(body: &Aabb, [a, b]: [Vec2; 2]) -> f64 {
         [body.min, Vec2::new(body.max.x, body.min.y), body.max, Vec2::new(body.min.x, body.max.y)];
     let along = |c: Vec2| distance_to_segment(c, a, b);
     corners.into_iter().map(along).fold(outside(a).min(outside(b)), f64::min)
+}
+
+/// Distance between a simple polygon and a segment.
+fn apart(polygon: &[Vec2], [a, b]: [Vec2; 2]) -> f64 {
+    let edges = || polygon.iter().copied().zip(polygon.iter().copied().cycle().skip(1));
+    let side = |p: Vec2, q: Vec2, r: Vec2| (q - p).perp(&(r - p));
+    let crosses = |(p, q): (Vec2, Vec2)| {
+        side(p, q, a) * side(p, q, b) <= 0.0 && side(a, b, p) * side(a, b, q) <= 0.0
+    };
+    if is_within(a, edges()) || (a != b && edges().any(crosses)) {
+        return 0.0;
+    }
+    let to = |(p, q): (Vec2, Vec2)| {
+        let ends = distance_to_segment(a, p, q).min(distance_to_segment(b, p, q));
+        ends.min(distance_to_segment(p, a, b))
+    };
+    edges().map(to).fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]

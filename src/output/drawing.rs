@@ -7,7 +7,7 @@
 use crate::curves::Path;
 use crate::geometry::{Aabb, Polygon, Pose, Vec2};
 use crate::vehicle::{Gear, Vehicle};
-use crate::world::Scene;
+use crate::world::{Outline, Scene, Shape};
 
 /// What to draw over a scene. Everything is optional and in the scene's frame; the
 /// default draws the scene alone.
@@ -52,7 +52,17 @@ const TOLERANCE: &str = r##"fill="#15803d" fill-opacity=".25" stroke="#15803d""#
 const PREPARATORY: &str = "#8b2fc9";
 const FORWARD: &str = "#2f7de1";
 const BACKWARD: &str = "#e8710a";
-const OBSTACLE: &str = r##"fill="#aab2bd" stroke="#6b7684""##;
+/// Areas, lines and points that a car must keep off, and those that only wheels must.
+const HIGH: [&str; 3] = [
+    r##"fill="#aab2bd" stroke="#6b7684""##,
+    r##"stroke="#6b7684" stroke-width="1.5""##,
+    r##"fill="#52606d""##,
+];
+const LOW: [&str; 3] = [
+    r##"fill="#e3d5b8" stroke="#a8894f""##,
+    r##"stroke="#a8894f" stroke-width="1.5""##,
+    r##"fill="#a8894f""##,
+];
 const BOUNDS: &str = r##"fill="none" stroke="#b4bdc8" stroke-dasharray="6 5""##;
 const LANE: &str = r##"fill="#22c55e" fill-opacity=".13" stroke="#22a052" stroke-opacity=".6""##;
 const SPOT: &str = r##"fill="#facc15" fill-opacity=".3" stroke="#ca9a04" stroke-opacity=".7""##;
@@ -115,7 +125,8 @@ fn view(scene: &Scene, drawing: &Drawing) -> Aabb {
         Aabb::around(shown).inflated(PADDING)
     } else {
         let near = Aabb::around(shown.iter().copied()).inflated(PADDING_ALONE);
-        let all = Aabb::around(scene.outlines().flatten().chain(shown));
+        let outlines: Vec<Outline> = scene.outlines().collect();
+        let all = Aabb::around(outlines.iter().flat_map(Outline::points).chain(shown));
         let all = all.inflated(PADDING / 2.0);
         Aabb { min: near.min.sup(&all.min), max: near.max.inf(&all.max) }
     };
@@ -144,11 +155,15 @@ impl Map {
             self.polygon(lane.vertices(), LANE);
             self.polygon(spot.vertices(), SPOT);
         }
-        let is_near = |o: &Vec<Vec2>| Aabb::around(o.iter().copied()).intersects(&view);
+        let is_near = |o: &Outline| Aabb::around(o.points()).intersects(&view);
         for outline in scene.outlines().filter(is_near) {
-            match outline[..] {
-                [point] => self.dot(point, 2.2, r##"fill="#52606d""##),
-                _ => self.polygon(&outline, OBSTACLE),
+            let vertices: Vec<Vec2> = outline.points().collect();
+            let [area, line, dot] = if outline.is_low { LOW } else { HIGH };
+            match outline.shape {
+                Shape::Point => self.dot(vertices[0], 2.2, dot),
+                Shape::Solid => self.polygon(&vertices, area),
+                Shape::Chain => self.line(&vertices, line),
+                Shape::Border => self.polygon(&vertices, &format!("fill=\"none\" {line}")),
             }
         }
         if let Some(path) = drawing.path {
@@ -321,8 +336,11 @@ fn legend(scene: &Scene, drawing: &Drawing) -> Vec<Entry> {
     if drawing.regions.is_some() {
         entries.extend([(area(LANE), "lane"), (area(SPOT), "spot")]);
     }
-    if !scene.obstacles.is_empty() || !scene.points.is_empty() {
-        entries.push((area(OBSTACLE), "obstacle"));
+    for (style, what, is_low) in [(HIGH[0], "obstacle", false), (LOW[0], "low: wheels only", true)]
+    {
+        if scene.outlines().any(|o| o.is_low == is_low) {
+            entries.push((area(style), what));
+        }
     }
     if scene.bounds.is_some() {
         entries.push((area(BOUNDS), "bounds"));

@@ -193,16 +193,10 @@ pub(super) mod tests {
         start.heading += std::f64::consts::TAU;
         let scene = Scene {
             name: "s".into(),
-            source: String::new(),
             vehicle: Vehicle::default(),
             start,
             goal: frame.world_from_local(path.end()),
-            goals: Vec::new(),
-            goal_tolerance: None,
-            parking_type: None,
-            obstacles: vec![],
-            points: vec![],
-            bounds: None,
+            ..Scene::default()
         };
         (scene, frame, path)
     }

@@ -6,10 +6,10 @@
 //! every path. [`plan`] finds paths that keep it with any planner: one arc out of the contact, and
 //! an ordinary problem from where it ends.
 
-use super::problem::Terms;
+use super::problem::{Place, Terms};
 use super::{Budget, PlanResult, Planner, Problem};
 use crate::curves::{Path, Segment, reeds_shepp};
-use crate::geometry::{Pose, Vec2};
+use crate::geometry::{Aabb, Pose, Vec2};
 use crate::vehicle::{Gear, Vehicle};
 use crate::world::Obstacles;
 use crate::world::collision::{BodyFrame, CollisionWorld, Sweep};
@@ -47,11 +47,17 @@ enum Leave {
 /// How deep the vehicle at `pose` reaches into what `world` holds, metres: 0 where it is free, and
 /// half of its width at most.
 pub(super) fn depth_into(world: &CollisionWorld, vehicle: &Vehicle, pose: Pose) -> f64 {
-    let is_free = |depth: f64| world.is_free_of(&vehicle.footprint(-depth), pose);
+    depth_by(world, |depth| vehicle.footprint(-depth), pose)
+}
+
+/// The same of the part of a car that is `part` of 0, and smaller by a depth with more.
+pub(super) fn depth_by(world: &CollisionWorld, part: impl Fn(f64) -> Aabb, pose: Pose) -> f64 {
+    let is_free = |depth: f64| world.is_free_of(&part(depth), pose);
     if is_free(0.0) {
         return 0.0;
     }
-    let (mut touching, mut free) = (0.0, vehicle.width.min(vehicle.length) / 2.0);
+    let size = part(0.0).max - part(0.0).min;
+    let (mut touching, mut free) = (0.0, size.x.min(size.y) / 2.0);
     while free - touching > 1e-5 {
         let middle = f64::midpoint(touching, free);
         *(if is_free(middle) { &mut free } else { &mut touching }) = middle;
@@ -140,8 +146,14 @@ impl Contact {
     fn between(&self, problem: &Problem, start: Pose, goal: Pose) -> Option<Problem> {
         let Problem { vehicle, frame, kind, ref obstacles, .. } = *problem;
         let terms = Terms { margin: self.margin, ..Terms::default() };
-        let (ends, obstacles) = ([start, goal], obstacles.clone());
-        let part = Problem::checked(vehicle, frame, kind, ends, obstacles, self.bounds, terms);
+        let place = Place {
+            obstacles: obstacles.clone(),
+            low: problem.low.clone(),
+            bounds: self.bounds,
+            contour: problem.contour.clone(),
+            margins: problem.margins,
+        };
+        let part = Problem::checked(vehicle, frame, kind, [start, goal], place, terms);
         // The lane begins where it did; the goal may lie farther out.
         let mouth = (problem.mouth - (goal.y - problem.goal.y)).max(0.0);
         part.ok().map(|part| Problem { mouth, ..part })

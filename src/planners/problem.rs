@@ -1,12 +1,13 @@
 //! A problem: a scene in planning coordinates, indexed and checked.
 
 use super::Shape;
-use super::contact::{Contact, depth_into};
+use super::conflict::Conflict;
+use super::contact::Contact;
 use crate::curves::smoothing::StandstillSteering;
-use crate::geometry::{Aabb, Frame, Pose, Vec2};
-use crate::vehicle::{Gear, Vehicle};
+use crate::geometry::{Frame, Pose, Vec2};
+use crate::vehicle::{Gear, Margins, Vehicle};
 use crate::world::cell::{Cell, Grid};
-use crate::world::collision::CollisionWorld;
+use crate::world::collision::{CollisionWorld, Contour};
 use crate::world::scene::InvalidField;
 use crate::world::spot::{self, Precision, SpotGuess};
 use crate::world::{GoalTolerance, ObstacleError, Obstacles, ParkingType, Scene, Stance};
@@ -31,9 +32,16 @@ pub struct Problem {
     pub goal: Pose,
     /// The obstacles, planning frame.
     pub obstacles: Obstacles,
+    /// What only wheels keep off, planning frame.
+    pub low: Obstacles,
+    /// The vehicle's outline within its footprint, where it is not all of it, as seen in the planning frame.
+    pub contour: Option<Contour>,
+    /// Clearance asked for on each side of the vehicle, as seen in the planning frame.
+    pub margins: Margins,
     /// The same obstacles, indexed for swept checks of this vehicle grown by the margin.
     pub collision: CollisionWorld,
-    /// Clearance that plans keep from obstacles, metres: see [`Problem::with_margin`].
+    /// Clearance that plans keep from obstacles, metres, on the side where it is least: see
+    /// [`Problem::with_margin`].
     pub margin: f64,
     /// What start or goal touches, where that is allowed: see [`Problem::allowing_contact`].
     pub contact: Option<Contact>,
@@ -97,6 +105,16 @@ impl Default for Terms {
     }
 }
 
+/// What a car plans among, as seen in the planning frame.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Place {
+    pub obstacles: Obstacles,
+    pub low: Obstacles,
+    pub bounds: Option<[Vec2; 4]>,
+    pub contour: Option<Contour>,
+    pub margins: Margins,
+}
+
 /// A problem that has no solution by its own data.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProblemError {
@@ -153,62 +171,6 @@ fn listed(goals: &[(String, ProblemError)]) -> String {
         other => format!("{field}: {other}"),
     };
     goals.iter().map(one).collect::<Vec<_>>().join("; ")
-}
-
-/// What keeps a car from standing where it is to start or to park.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Conflict {
-    /// It reaches into an obstacle.
-    #[error("touches an obstacle: it reaches {depth:.3} m into {obstacle}")]
-    Obstacle {
-        /// The scene's field, such as `obstacles[3]`.
-        obstacle: String,
-        /// The least margin by which a smaller car would clear it, metres.
-        depth: f64,
-    },
-    /// Its rear axle is out of the bounds.
-    #[error("has its axle outside the bounds")]
-    Bounds,
-    /// One of both.
-    #[error("touches an obstacle or leaves the bounds")]
-    Unknown,
-}
-
-impl Conflict {
-    /// What the car meets at `pose` of the scene, in its own frame.
-    fn of(scene: &Scene, pose: Pose) -> Conflict {
-        let vehicle = &scene.vehicle;
-        let empty = Scene { obstacles: vec![], points: vec![], ..scene.clone() };
-        let single = |obstacles: &[Vec<[f64; 2]>], points: &[[f64; 2]]| {
-            let (obstacles, points) = (obstacles.to_vec(), points.to_vec());
-            Scene { obstacles, points, ..empty.clone() }.geometry().ok()
-        };
-        let body = vehicle.footprint_at(pose).aabb().inflated(1e-3);
-        let is_near = |corners: &[[f64; 2]]| {
-            Aabb::around(corners.iter().map(|&[x, y]| Vec2::new(x, y))).intersects(&body)
-        };
-        let lists = scene.obstacles.chunks(1).enumerate().filter(|(_, o)| is_near(&o[0]));
-        let lists = lists.map(|(i, o)| (format!("obstacles[{i}]"), single(o, &[])));
-        let points = scene.points.chunks(1).enumerate().filter(|(_, p)| is_near(p));
-        let points = points.map(|(i, p)| (format!("points[{i}]"), single(&[], p)));
-        let mut deepest: Option<(String, f64)> = None;
-        for (obstacle, one) in lists.chain(points) {
-            let Some(one) = one else { continue };
-            let free = depth_into(&CollisionWorld::new(&one, None, vehicle, 0.0), vehicle, pose);
-            if free == 0.0 {
-                continue;
-            }
-            if deepest.as_ref().is_none_or(|(_, depth)| free > *depth) {
-                deepest = Some((obstacle, free));
-            }
-        }
-        let out = |b: [f64; 4]| pose.x < b[0] || pose.y < b[1] || pose.x > b[2] || pose.y > b[3];
-        match deepest {
-            Some((obstacle, depth)) => Conflict::Obstacle { obstacle, depth },
-            None if scene.bounds.is_some_and(out) => Conflict::Bounds,
-            None => Conflict::Unknown,
-        }
-    }
 }
 
 impl Problem {
@@ -294,10 +256,24 @@ impl Problem {
                 scene.vehicle.rear_axle(Pose::new(0.0, 0.0, stance.heading()))
             }),
         };
+        let outside = [(scene.start, true), (scene.goal, false)];
+        if let Some((pose, is_start)) = outside.into_iter().find(|(p, _)| !scene.is_in_area(*p)) {
+            let error = if is_start {
+                ProblemError::StartInCollision
+            } else {
+                ProblemError::GoalInCollision
+            };
+            return Err(error(pose.into(), Conflict::Area));
+        }
+        let place = Place {
+            obstacles,
+            low: spot::low_in_frame(scene, &frame, precision)?,
+            bounds,
+            contour: scene.contour_in(&frame)?,
+            margins: scene.margins_in(&frame),
+        };
         let kind = stance.map(Stance::kind);
-        let seen =
-            Self::checked(scene.vehicle, frame, kind, [start, goal], obstacles, bounds, terms);
-        let mut problem = seen?;
+        let mut problem = Self::checked(scene.vehicle, frame, kind, [start, goal], place, terms)?;
         problem.mouth = mouth;
         problem.tolerance = scene.goal_tolerance.map(|tolerance| (goal, tolerance));
         Ok(problem)
@@ -312,8 +288,8 @@ impl Problem {
     ) -> Result<Problem, ProblemError> {
         let goal = grid.goal(cell.stance, &vehicle);
         let (walls, ends) = (grid.walls(cell)?, [start, goal]);
-        let terms = Terms::default();
-        Self::checked(vehicle, Frame::WORLD, Some(cell.kind()), ends, walls, None, terms)
+        let place = Place { obstacles: walls, ..Place::default() };
+        Self::checked(vehicle, Frame::WORLD, Some(cell.kind()), ends, place, Terms::default())
     }
 
     pub(super) fn checked(
@@ -321,23 +297,28 @@ impl Problem {
         frame: Frame,
         kind: Option<ParkingType>,
         [start, goal]: [Pose; 2],
-        obstacles: Obstacles,
-        bounds: Option<[Vec2; 4]>,
+        place: Place,
         terms: Terms,
     ) -> Result<Problem, ProblemError> {
+        let Place { obstacles, low, bounds, contour, margins } = place;
         let least = Self::usual_margin(&vehicle);
         let asked = terms.margin;
-        let mut margin = if asked > Self::MARGIN { asked.max(least) } else { least };
-        let mut collision = CollisionWorld::new(&obstacles, bounds, &vehicle, margin);
+        let sides = margins.at_least(if asked > Self::MARGIN { asked.max(least) } else { least });
+        // No more than this is kept on any side.
+        let mut margin = sides.most();
+        let alone = |one: &Obstacles, margin: f64| {
+            CollisionWorld::of(one, None, &vehicle, contour.as_ref(), sides.at_most(margin))
+        };
+        let mut collision =
+            CollisionWorld::of(&obstacles, bounds, &vehicle, contour.as_ref(), sides);
         let mut contact = None;
         let ends_are_free =
             |world: &CollisionWorld| world.pose_is_free(start) && world.pose_is_free(goal);
         if !ends_are_free(&collision) {
             // What is next to start or goal keeps the whole plan from the margin, but only from
             // its own: everything else is kept as far away as was asked for.
-            let alone = |one: &Obstacles, margin| CollisionWorld::new(one, None, &vehicle, margin);
             let (kept, mut close) = obstacles.partition(|one| ends_are_free(&alone(one, margin)));
-            let far = CollisionWorld::new(&kept, bounds, &vehicle, margin);
+            let far = CollisionWorld::of(&kept, bounds, &vehicle, contour.as_ref(), sides);
             let mut touched = Obstacles::default();
             if terms.contact > 0.0 {
                 (close, touched) = close.partition(|one| ends_are_free(&alone(one, 0.0)));
@@ -348,15 +329,27 @@ impl Problem {
                     break;
                 }
             }
-            collision = far.tolerating(&close, &vehicle, margin);
+            collision = far.tolerating(alone(&close, margin));
             if !touched.is_empty() {
                 let found = Contact::new(&touched, &vehicle, [start, goal], bounds, asked);
                 let depth = found.start_depth.max(found.goal_depth);
                 // Where it is deeper than allowed the shrunken car still touches, and is refused.
                 let shrunk = -depth.min(terms.contact);
-                collision = collision.tolerating(&touched, &vehicle, shrunk);
+                collision =
+                    collision.tolerating(CollisionWorld::new(&touched, None, &vehicle, shrunk));
                 (margin, contact) = (0.0, Some(found));
             }
+        }
+        if !low.is_empty() {
+            let wheels = |margin: f64| {
+                let empty = CollisionWorld::new(&Obstacles::default(), None, &vehicle, 0.0);
+                empty.keeping_wheels_off(&low, &vehicle, sides.at_most(margin))
+            };
+            let tried =
+                std::iter::once(sides.most()).chain(Self::margins_below(sides.most(), least));
+            let kept = tried.into_iter().find(|&m| ends_are_free(&wheels(m))).unwrap_or(0.0);
+            collision = collision.keeping_wheels_off(&low, &vehicle, sides.at_most(kept));
+            margin = margin.min(kept);
         }
         if !collision.pose_is_free(start) {
             return Err(ProblemError::StartInCollision(start.into(), Conflict::Unknown));
@@ -364,6 +357,7 @@ impl Problem {
         if !collision.pose_is_free(goal) {
             return Err(ProblemError::GoalInCollision(goal.into(), Conflict::Unknown));
         }
+        let margin = sides.at_most(margin).least();
         Ok(Problem {
             vehicle,
             frame,
@@ -372,6 +366,9 @@ impl Problem {
             start,
             goal,
             obstacles,
+            low,
+            contour,
+            margins,
             collision,
             margin,
             contact,

@@ -3,11 +3,13 @@
 //! Kinematic bicycle, pose at the rear-axle centre (paper eq. 1): curvature
 //! `κ = tan δ / wheelbase`.
 
+mod margins;
 mod overlap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::{Aabb, Polygon, Pose};
+use crate::geometry::{Aabb, Polygon, Pose, Vec2};
+pub use margins::Margins;
 
 /// Direction of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -91,6 +93,12 @@ impl Default for Vehicle {
     }
 }
 
+/// A box in the vehicle's frame, larger by a margin on each side.
+fn grown(body: Aabb, margins: Margins) -> Aabb {
+    let Margins { front, rear, left, right } = margins;
+    Aabb { min: body.min - Vec2::new(rear, right), max: body.max + Vec2::new(front, left) }
+}
+
 /// A vehicle field outside its range.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("vehicle.{field} is {value}; it must be {expected}")]
@@ -106,6 +114,9 @@ pub struct VehicleError {
 impl Vehicle {
     /// How fast the front wheels of a usual car turn, rad/s.
     pub const STEER_RATE: f64 = 0.6;
+
+    /// Radius of a wheel in wheelbases: 0.34 m of the default vehicle.
+    pub const WHEEL_RADIUS: f64 = 0.12;
 
     /// Checks every field.
     pub fn validate(&self) -> Result<(), VehicleError> {
@@ -183,10 +194,20 @@ impl Vehicle {
         self.rear_overhang.max(self.front_extent()).hypot(self.width / 2.0)
     }
 
-    /// The footprint in the vehicle's own frame, grown by `margin` metres on every side.
-    pub fn footprint(&self, margin: f64) -> Aabb {
+    /// The footprint in the vehicle's own frame, grown by a margin on every side, metres.
+    pub fn footprint(&self, margins: impl Into<Margins>) -> Aabb {
         let half = self.width / 2.0;
-        Aabb::new(-self.rear_overhang, -half, self.front_extent(), half).inflated(margin)
+        grown(Aabb::new(-self.rear_overhang, -half, self.front_extent(), half), margins.into())
+    }
+
+    /// The rectangle around the four wheels where they stand, grown like [`Vehicle::footprint`]: what must keep off
+    /// kerbs. Wheels reach as far out as the body's sides and ahead of their axles by [`Vehicle::WHEEL_RADIUS`], no
+    /// farther than the body; nothing low comes between them.
+    pub fn wheel_box(&self, margins: impl Into<Margins>) -> Aabb {
+        let (radius, half) = (Self::WHEEL_RADIUS * self.wheelbase, self.width / 2.0);
+        let rear = -radius.min(self.rear_overhang);
+        let front = (self.wheelbase + radius).min(self.front_extent());
+        grown(Aabb::new(rear, -half, front, half), margins.into())
     }
 
     /// The footprint at `pose`.

@@ -130,17 +130,12 @@ impl Draw {
         };
         let in_world = |p: &Polygon| in_world(p, &frame);
         Some(Scene {
-            name: String::new(),
-            source: String::new(),
             vehicle: self.vehicle,
             start: frame.world_from_local(start),
             goal: frame.world_from_local(goal),
-            goals: Vec::new(),
-            goal_tolerance: None,
             parking_type: unusual.slant().is_none().then_some(kind),
             obstacles: walls.iter().map(in_world).collect(),
-            points: Vec::new(),
-            bounds: None,
+            ..Scene::default()
         })
     }
 

@@ -88,12 +88,8 @@ pub fn clutter(seed: u64, index: u64) -> Scene {
         vehicle,
         start,
         goal,
-        goals: Vec::new(),
-        goal_tolerance: None,
-        parking_type: None,
-        obstacles: Vec::new(),
-        points: Vec::new(),
         bounds: draw.rng.random_bool(0.25).then_some([-border, -border, border, border]),
+        ..Scene::default()
     };
     // Obstacles for each square of one vehicle length, and the kinds that this scene has.
     let density = 0.6 * 10.0_f64.powf(-draw.rng.random_range(0.0..1.2));

@@ -70,12 +70,10 @@ pub fn generate(
         vehicle: *vehicle,
         start: frame.world_from_local(start),
         goal: frame.world_from_local(goal),
-        goals: Vec::new(),
-        goal_tolerance: None,
         parking_type: Some(kind),
         obstacles: lot.polygons.iter().map(|p| in_world(p, &frame)).collect(),
-        points: Vec::new(),
         bounds: Some(box_in_world(bounds, &frame)),
+        ..Scene::default()
     }
 }
 

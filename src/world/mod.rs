@@ -9,6 +9,7 @@
 pub mod abstraction;
 #[cfg(any(test, feature = "generate"))]
 pub mod bays;
+mod body;
 pub mod cell;
 #[cfg(any(test, feature = "generate"))]
 pub mod clutter;
@@ -20,6 +21,7 @@ mod kind;
 #[cfg(any(test, feature = "generate"))]
 pub mod lots;
 mod obstacles;
+mod outlines;
 pub mod scene;
 mod scene_file;
 pub mod spot;
@@ -28,4 +30,5 @@ pub mod tpcap;
 pub use goals::GoalTolerance;
 pub use kind::{Level, ParkingType, Stance, UnknownName};
 pub use obstacles::{ObstacleError, Obstacles};
+pub use outlines::{DrivableArea, LowObstacles, Outline, Shape};
 pub use scene::Scene;

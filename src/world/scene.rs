@@ -15,13 +15,13 @@ use serde::{Deserialize, Serialize};
 
 use super::goals::GoalTolerance;
 use super::scene_file::{SceneFile, parse_json};
-use super::{ObstacleError, Obstacles, ParkingType, tpcap};
+use super::{DrivableArea, LowObstacles, ParkingType, tpcap};
 use crate::files::{reason, write_whole};
-use crate::geometry::{Polygon, Polyline, Pose, Vec2};
-use crate::vehicle::Vehicle;
+use crate::geometry::Pose;
+use crate::vehicle::{Margins, Vehicle};
 
 /// A parking scene in its own (world) frame; metres and radians.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "SceneFile", into = "SceneFile")]
 pub struct Scene {
     /// Name, used in rows and file names.
@@ -30,6 +30,11 @@ pub struct Scene {
     pub source: String,
     /// The car.
     pub vehicle: Vehicle,
+    /// The car's outline from above, a simple polygon in its own frame within the rectangle of its sizes, where it
+    /// does not take up all of that: chamfered corners, mirrors. None: empty.
+    pub contour: Vec<[f64; 2]>,
+    /// Clearance to keep on each side of the car, metres, beyond what planning keeps anyway.
+    pub margins: Option<Margins>,
     /// Rear-axle pose to start from.
     pub start: Pose,
     /// Rear-axle pose to park at; of several [`Scene::goals`] the first.
@@ -43,8 +48,14 @@ pub struct Scene {
     pub parking_type: Option<ParkingType>,
     /// Simple polygons, closed implicitly; two vertices are a wall without thickness.
     pub obstacles: Vec<Vec<[f64; 2]>>,
+    /// Walls without thickness, one after the other: chains of two or more vertices, not closed.
+    pub polylines: Vec<Vec<[f64; 2]>>,
     /// Obstacle points, as a range sensor sees them (an extension of the format).
     pub points: Vec<[f64; 2]>,
+    /// What only wheels must keep off.
+    pub low: LowObstacles,
+    /// Where the car's body must stay, if that is limited.
+    pub drivable_area: Option<DrivableArea>,
     /// The rear axle stays in `[xmin, ymin, xmax, ymax]`.
     pub bounds: Option<[f64; 4]>,
 }
@@ -267,6 +278,7 @@ impl Scene {
             let message = format!("is {}; it must be {}", e.value, e.expected);
             return invalid(format!("vehicle.{}", e.field), message);
         }
+        self.check_contour()?;
         if self.goals.len() > Self::MAX_GOALS {
             let (given, most) = (self.goals.len(), Self::MAX_GOALS);
             let message = format!("has {given} poses; expected at most {most}");
@@ -302,23 +314,7 @@ impl Scene {
         if let Some(tolerance) = self.goal_tolerance {
             tolerance.validate()?;
         }
-        for (i, polygon) in self.obstacles.iter().enumerate() {
-            for (j, vertex) in polygon.iter().enumerate() {
-                numbers(&|| format!("obstacles[{i}][{j}]"), vertex)?;
-            }
-            if polygon.len() < 2 {
-                let vertices = if polygon.is_empty() { "no vertices" } else { "1 vertex" };
-                return invalid(
-                    format!("obstacles[{i}]"),
-                    format!(
-                        "has {vertices}; a polygon needs at least 3, a wall 2 (or use \"points\")"
-                    ),
-                );
-            }
-        }
-        for (i, point) in self.points.iter().enumerate() {
-            numbers(&|| format!("points[{i}]"), point)?;
-        }
+        self.check_outlines(numbers)?;
         if let Some(b) = self.bounds {
             numbers(&|| "bounds".to_owned(), &b)?;
             if b[0] >= b[2] || b[1] >= b[3] {
@@ -375,34 +371,6 @@ impl Scene {
             }
         }
         stem
-    }
-
-    /// What each obstacle looks like, for drawing: its corners, or the single point.
-    pub fn outlines(&self) -> impl Iterator<Item = Vec<Vec2>> + '_ {
-        let points = self.points.iter().map(std::slice::from_ref);
-        let outlines = self.obstacles.iter().map(Vec::as_slice).chain(points);
-        outlines.map(|o| o.iter().map(|&[x, y]| Vec2::new(x, y)).collect())
-    }
-
-    /// The obstacles as geometry, in the scene's frame.
-    pub fn geometry(&self) -> Result<Obstacles, ObstacleError> {
-        self.geometry_by(|v| v)
-    }
-
-    /// [`Scene::geometry`] with every point mapped by `map`.
-    pub fn geometry_by(&self, map: impl Fn(Vec2) -> Vec2) -> Result<Obstacles, ObstacleError> {
-        let vec = |&[x, y]: &[f64; 2]| map(Vec2::new(x, y));
-        let mut polygons = Vec::with_capacity(self.obstacles.len());
-        let mut walls = Vec::new();
-        for (index, obstacle) in self.obstacles.iter().enumerate() {
-            let vertices: Vec<Vec2> = obstacle.iter().map(&vec).collect();
-            let added = match vertices.len() {
-                2 => Polyline::new(vertices).map(|wall| walls.push(wall)),
-                _ => Polygon::new(vertices).map(|polygon| polygons.push(polygon)),
-            };
-            added.map_err(|fault| ObstacleError::Shape { kind: "polygon", index, fault })?;
-        }
-        Obstacles::new(polygons, walls, self.points.iter().map(vec).collect())
     }
 }
 

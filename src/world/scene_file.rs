@@ -5,11 +5,11 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, error::Category};
 
-use super::ParkingType;
 use super::goals::GoalTolerance;
 use super::scene::{Scene, SceneError};
+use super::{DrivableArea, LowObstacles, ParkingType};
 use crate::geometry::Pose;
-use crate::vehicle::Vehicle;
+use crate::vehicle::{Margins, Vehicle};
 
 /// A scene as it is written: with one `goal`, or with `goals`.
 #[derive(Serialize, Deserialize)]
@@ -20,6 +20,10 @@ pub(super) struct SceneFile {
     #[serde(default)]
     source: String,
     vehicle: Vehicle,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    contour: Vec<[f64; 2]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    margins: Option<Margins>,
     start: Pose,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     goal: Option<Pose>,
@@ -32,6 +36,12 @@ pub(super) struct SceneFile {
     obstacles: Vec<Vec<[f64; 2]>>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     points: Vec<[f64; 2]>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    polylines: Vec<Vec<[f64; 2]>>,
+    #[serde(default, skip_serializing_if = "LowObstacles::is_empty")]
+    low: LowObstacles,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    drivable_area: Option<DrivableArea>,
     #[serde(default)]
     bounds: Option<[f64; 4]>,
 }
@@ -54,19 +64,25 @@ impl TryFrom<SceneFile> for Scene {
                 return Err(text.to_owned());
             }
         };
-        let SceneFile { name, source, vehicle, start, goal_tolerance, .. } = file;
-        let SceneFile { parking_type, obstacles, points, bounds, .. } = file;
+        let SceneFile { name, source, vehicle, contour, margins, start, goal_tolerance, .. } = file;
+        let SceneFile { parking_type, obstacles, polylines, points, .. } = file;
+        let SceneFile { low, drivable_area, bounds, .. } = file;
         Ok(Scene {
             name,
             source,
             vehicle,
+            contour,
+            margins,
             start,
             goal,
             goals,
             goal_tolerance,
             parking_type,
             obstacles,
+            polylines,
             points,
+            low,
+            drivable_area,
             bounds,
         })
     }
@@ -79,6 +95,8 @@ impl From<Scene> for SceneFile {
             name: scene.name,
             source: scene.source,
             vehicle: scene.vehicle,
+            contour: scene.contour,
+            margins: scene.margins,
             start: scene.start,
             goal: one.then_some(scene.goal),
             goals: (!one).then_some(scene.goals),
@@ -86,6 +104,9 @@ impl From<Scene> for SceneFile {
             parking_type: scene.parking_type,
             obstacles: scene.obstacles,
             points: scene.points,
+            polylines: scene.polylines,
+            low: scene.low,
+            drivable_area: scene.drivable_area,
             bounds: scene.bounds,
         }
     }
@@ -143,10 +164,6 @@ fn word_at<'a>(text: &'a str, error: &serde_json::Error) -> Option<&'a str> {
 
 /// The first geometric field that is not the numbers it should be.
 fn misshapen(scene: &Value) -> Option<(String, String)> {
-    let list = |field: &str| {
-        let items = scene.get(field).and_then(Value::as_array);
-        items.into_iter().flatten().enumerate()
-    };
     let pose = |field: &str| not_numbers(scene.get(field)?, 3, field.to_owned());
     let bounds = scene.get("bounds").filter(|b| !b.is_null());
     pose("start")
@@ -163,19 +180,36 @@ fn misshapen(scene: &Value) -> Option<(String, String)> {
         })
         .or_else(|| wrong_tolerance(scene.get("goal_tolerance")?))
         .or_else(|| not_numbers(bounds?, 4, "bounds".to_owned()))
-        .or_else(|| {
-            list("points").find_map(|(i, point)| not_numbers(point, 2, format!("points[{i}]")))
-        })
-        .or_else(|| {
-            list("obstacles").find_map(|(i, polygon)| {
-                let Some(vertices) = polygon.as_array() else {
-                    let message = format!("is {}; expected a list of [x, y]", brief(polygon));
-                    return Some((format!("obstacles[{i}]"), message));
-                };
-                let field = |j| format!("obstacles[{i}][{j}]");
-                vertices.iter().enumerate().find_map(|(j, v)| not_numbers(v, 2, field(j)))
-            })
-        })
+        .or_else(|| wrong_lists(scene, "", &["contour", "points", "obstacles", "polylines"]))
+        .or_else(|| wrong_lists(scene.get("low")?, "low.", &["points", "obstacles", "polylines"]))
+        .or_else(|| wrong_lists(scene.get("drivable_area")?, "drivable_area.", &["outer", "holes"]))
+}
+
+/// The first of these lists of an object that is not points, or lists of points.
+fn wrong_lists(object: &Value, prefix: &str, names: &[&str]) -> Option<(String, String)> {
+    let vertices = |field: String, list: &Value| {
+        let Some(vertices) = list.as_array() else {
+            return Some((field, format!("is {}; expected a list of [x, y]", brief(list))));
+        };
+        let each = |(j, v)| not_numbers(v, 2, format!("{field}[{j}]"));
+        vertices.iter().enumerate().find_map(each)
+    };
+    if !object.is_object() {
+        let field = prefix.trim_end_matches('.').to_owned();
+        let expected = names.join(", ");
+        let message = format!("is {}; expected an object of {expected}", brief(object));
+        return (!object.is_null()).then_some((field, message));
+    }
+    names.iter().find_map(|&name| {
+        let (field, list) = (format!("{prefix}{name}"), object.get(name)?);
+        if ["contour", "points", "outer"].contains(&name) {
+            return vertices(field, list);
+        }
+        let Some(lists) = list.as_array() else {
+            return Some((field, format!("is {}; expected a list", brief(list))));
+        };
+        lists.iter().enumerate().find_map(|(i, list)| vertices(format!("{field}[{i}]"), list))
+    })
 }
 
 /// What is wrong with a goal tolerance that is not two numbers.

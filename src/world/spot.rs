@@ -19,7 +19,7 @@
 
 use super::abstraction::{Abstraction, Surroundings, abstractions};
 use super::cell::{Axis, Grid};
-use super::{ObstacleError, Obstacles, ParkingType, Scene, Stance};
+use super::{ObstacleError, Obstacles, ParkingType, Scene, Shape, Stance};
 use crate::geometry::{Aabb, Frame, Pose, Vec2, segment_in_box};
 
 mod angled;
@@ -287,14 +287,13 @@ fn around_goal(scene: &Scene, precision: Precision) -> Surroundings {
     let reach = Aabb { min: center.position(), max: center.position() }.inflated(far);
     let point = |&[x, y]: &[f64; 2]| Vec2::new(x, y);
     let is_near = |points: &[[f64; 2]]| Aabb::around(points.iter().map(point)).intersects(&reach);
-    let seen = |p: &[f64; 2]| precision.point(view(point(p)));
+    let seen = |p: Vec2| precision.point(view(p));
     let mut near = Surroundings::default();
-    for polygon in scene.obstacles.iter().filter(|o| is_near(o)) {
-        let next = polygon.iter().cycle().skip(1);
-        near.add_polygon(polygon.iter().zip(next).map(|(a, b)| (seen(a), seen(b))));
-    }
-    for p in scene.points.iter().filter(|p| reach.contains(point(p))) {
-        near.add_point(seen(p));
+    for outline in scene.high_outlines().filter(|o| is_near(o.vertices)) {
+        match outline.shape {
+            Shape::Point => outline.points().for_each(|p| near.add_point(seen(p))),
+            _ => near.add_polygon(outline.edges().map(|(a, b)| (seen(a), seen(b)))),
+        }
     }
     near
 }
@@ -397,6 +396,16 @@ fn travels_backward_along_x(start: Pose) -> bool {
     if along.abs() > 0.2 { along < 0.0 } else { start.x > 0.0 }
 }
 
+/// What only wheels keep off, seen from the planning frame.
+pub fn low_in_frame(
+    scene: &Scene,
+    frame: &Frame,
+    precision: Precision,
+) -> Result<Obstacles, ObstacleError> {
+    let view = frame.view();
+    scene.low_geometry_by(|p| precision.point(view(p)))
+}
+
 /// Corners of a world-aligned box `[xmin, ymin, xmax, ymax]` seen from `frame`,
 /// counter-clockwise there.
 pub fn bounds_in_frame(
@@ -421,17 +430,11 @@ mod tests {
 
     fn scene(kind: ParkingType, start: Pose, goal: Pose) -> Scene {
         Scene {
-            name: String::new(),
-            source: String::new(),
             vehicle: Vehicle::default(),
             start,
             goal,
-            goals: Vec::new(),
-            goal_tolerance: None,
             parking_type: Some(kind),
-            obstacles: vec![],
-            points: vec![],
-            bounds: None,
+            ..Scene::default()
         }
     }
 

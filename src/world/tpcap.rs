@@ -94,12 +94,8 @@ pub fn parse(text: &str, path: &Path) -> Result<Scene, SceneError> {
         vehicle: vehicle(),
         start: Pose::new(values[0], values[1], values[2]),
         goal: Pose::new(values[3], values[4], values[5]),
-        goals: Vec::new(),
-        goal_tolerance: None,
-        parking_type: None,
         obstacles: obstacles.collect(),
-        points: Vec::new(),
-        bounds: None,
+        ..Scene::default()
     })
 }
 

@@ -23,7 +23,7 @@ use crate::episode::{Clearance, Judge, WAY_ENDS};
 use crate::geometry::Pose;
 use crate::output::PathFile;
 use crate::vehicle::Vehicle;
-use crate::world::{GoalTolerance, Scene};
+use crate::world::{GoalTolerance, Outline, Scene, Shape};
 
 /// The independent check of every row.
 pub const JUDGE: Judge = Judge { verdict: "ok", check: judge };
@@ -155,6 +155,12 @@ pub enum Violation {
         /// How far, millimetres.
         mm: f64,
     },
+    /// The car leaves the drivable area.
+    #[error("pose {pose}: the car is out of the drivable area")]
+    OutOfArea {
+        /// Index of the pose at or before it.
+        pose: usize,
+    },
     /// The footprint reaches into an obstacle.
     #[error("pose {pose}: the footprint reaches {mm:.1} mm into {obstacle}")]
     Collision {
@@ -162,7 +168,7 @@ pub enum Violation {
         pose: usize,
         /// How deep, millimetres: the footprint shrunk by this is free.
         mm: f64,
-        /// Which obstacle, such as `polygon 3`.
+        /// Which obstacle, such as `obstacles[3]`.
         obstacle: String,
     },
 }
@@ -192,6 +198,17 @@ fn arc(curvature: f64, chord: f64) -> f64 {
     if half < 1e-8 { chord } else { 2.0 / curvature.abs() * half.min(1.0).asin() }
 }
 
+/// An outline as vectors, counter-clockwise.
+fn counter_clockwise(outline: &[[f64; 2]]) -> Vec<Vector2> {
+    let mut vertices: Vec<Vector2> = outline.iter().map(|&[x, y]| Vector2::new(x, y)).collect();
+    let next = vertices.iter().cycle().skip(1);
+    let twice: f64 = vertices.iter().zip(next).map(|(a, b)| a.perp_dot(*b)).sum();
+    if twice < 0.0 {
+        vertices.reverse();
+    }
+    vertices
+}
+
 /// A scene made ready, in coordinates relative to its start: scenes may lie anywhere.
 struct Oracle {
     origin: Vector2,
@@ -203,7 +220,12 @@ struct Oracle {
     tolerance: GoalTolerance,
     bounds: Option<Extent>,
     solids: Vec<Solid>,
-    points: Vec<Vector2>,
+    /// Single points: what they are called, where they lie, and whether they are low.
+    points: Vec<(String, Vector2, bool)>,
+    /// The border of the drivable area.
+    area: Option<Vec<Vector2>>,
+    /// The car's outline in its own frame, counter-clockwise; empty where it is its rectangle.
+    outline: Vec<Vector2>,
 }
 
 impl Oracle {
@@ -211,6 +233,7 @@ impl Oracle {
         let origin = Vector2::new(scene.start.x, scene.start.y);
         let local = |x: f64, y: f64| Vector2::new(x, y) - origin;
         let locals = |v: &[[f64; 2]]| v.iter().map(|&[x, y]| local(x, y)).collect::<Vec<_>>();
+        let outlines: Vec<Outline> = scene.outlines().collect();
         let state = |p: Pose| State { position: local(p.x, p.y), heading: p.heading };
         let goals = scene.all_goals();
         let resolutions = goals.iter().map(|goal| goal.resolution());
@@ -225,8 +248,18 @@ impl Oracle {
             bounds: scene
                 .bounds
                 .map(|[x0, y0, x1, y1]| Extent { min: local(x0, y0), max: local(x1, y1) }),
-            solids: scene.obstacles.iter().map(|o| Solid::new(locals(o))).collect(),
-            points: locals(&scene.points),
+            solids: outlines
+                .iter()
+                .filter(|o| o.shape != Shape::Point)
+                .map(|o| Solid::new(o.to_string(), o.is_low, o.shape, locals(o.vertices)))
+                .collect(),
+            points: outlines
+                .iter()
+                .filter(|o| o.shape == Shape::Point)
+                .map(|o| (o.to_string(), locals(o.vertices)[0], o.is_low))
+                .collect(),
+            area: scene.drivable_area.as_ref().map(|area| locals(&area.outer)),
+            outline: counter_clockwise(&scene.contour),
         }
     }
 
@@ -400,41 +433,48 @@ impl Oracle {
                 return Err(Violation::OutOfBounds { pose, mm: out * 1e3 });
             }
         }
-        let body = Body::new(&self.vehicle, at);
+        let body = Body::outlined(&self.vehicle, &self.outline, at);
+        let wheels = Body::wheels(&self.vehicle, at);
+        let part = |is_low: bool| if is_low { &wheels } else { &body };
+        if self.area.as_ref().is_some_and(|area| !point_in_poly2d(body.inside(), area)) {
+            return Err(Violation::OutOfArea { pose });
+        }
         let mut collision = |mm, obstacle| contacts.met(pose, mm, obstacle);
         // Whatever is farther than the nearest so far can neither touch nor lower it.
-        let far = |extent: &Extent, nearest: f64| {
-            let gap = extent.gap(&body.extent);
+        let far = |part: &Body, extent: &Extent, nearest: f64| {
+            let gap = extent.gap(&part.extent);
             gap > 0.0 && gap >= nearest
         };
-        for (i, solid) in self.solids.iter().enumerate() {
-            if far(&solid.extent, *clearance) {
+        for solid in &self.solids {
+            let part = part(solid.is_low);
+            if far(part, &solid.extent, *clearance) {
                 continue;
             }
-            if point_in_poly2d(body.center(), &solid.vertices) {
-                collision(body.half.min_element() * 1e3, format!("polygon {i}"))?;
+            if point_in_poly2d(part.inside(), &solid.filled) {
+                collision(part.half.min_element() * 1e3, solid.name.clone())?;
             }
             for (edge, extent) in &solid.edges {
-                if far(extent, *clearance) {
+                if far(part, extent, *clearance) {
                     continue;
                 }
-                *clearance = clearance.min(body.distance_to_edge(edge));
+                *clearance = clearance.min(part.distance_to_edge(edge, *clearance));
                 if *clearance <= 0.0
-                    && let Some(mm) = body.depth_mm(|margin| body.touches_edge(edge, margin))
+                    && let Some(mm) = part.depth_mm(|margin| part.touches_edge(edge, margin))
                 {
-                    collision(mm, format!("polygon {i}"))?;
+                    collision(mm, solid.name.clone())?;
                 }
             }
         }
-        for (i, &point) in self.points.iter().enumerate() {
-            if far(&Extent { min: point, max: point }, *clearance) {
+        for &(ref name, point, is_low) in &self.points {
+            let part = part(is_low);
+            if far(part, &Extent { min: point, max: point }, *clearance) {
                 continue;
             }
-            *clearance = clearance.min(body.distance_to_point(point));
+            *clearance = clearance.min(part.distance_to_point(point, *clearance));
             if *clearance <= 0.0
-                && let Some(mm) = body.depth_mm(|margin| body.touches_point(point, margin))
+                && let Some(mm) = part.depth_mm(|margin| part.touches_point(point, margin))
             {
-                collision(mm, format!("point {i}"))?;
+                collision(mm, name.clone())?;
             }
         }
         Ok(())

@@ -172,13 +172,9 @@ mod tests {
         };
         let goal = vehicle.rear_axle(Pose::new(0.0, 0.0, std::f64::consts::FRAC_PI_2));
         let scene = Scene {
-            name: String::new(),
-            source: String::new(),
             vehicle,
             start: Pose::new(-8.0 * scale, 5.0 * scale, 0.0),
             goal,
-            goals: Vec::new(),
-            goal_tolerance: None,
             parking_type: Some(ParkingType::Reverse),
             obstacles: vec![
                 block([-4.0, -2.5, -1.3, 2.4]),
@@ -186,8 +182,7 @@ mod tests {
                 block([-30.0, 9.0, 30.0, 9.5]),
                 block([9.0, 2.0, 9.2, 9.0]),
             ],
-            points: Vec::new(),
-            bounds: None,
+            ..Scene::default()
         };
         Problem::new(&scene).unwrap()
     }

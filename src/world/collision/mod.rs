@@ -6,15 +6,17 @@
 //! Touching counts as collision.
 
 mod bounds;
+mod contour;
 mod index;
 mod sweep;
 
 use crate::curves::{Path, Segment, SmoothPath};
 use crate::geometry::{Aabb, Pose, Vec2, segment_in_box};
-use crate::vehicle::Vehicle;
+use crate::vehicle::{Margins, Vehicle};
 
 use super::Obstacles;
 use bounds::ConvexBounds;
+pub use contour::Contour;
 use index::EdgeIndex;
 pub use sweep::Sweep;
 
@@ -25,18 +27,57 @@ pub struct Contact(usize);
 /// Obstacles indexed for swept checks of one footprint.
 #[derive(Clone, Debug)]
 pub struct CollisionWorld {
-    index: EdgeIndex,
+    /// What the whole car keeps off.
+    body: Kept,
     bounds: Option<ConvexBounds>,
-    footprint: Aabb,
-    tolerated: Vec<Tolerated>,
+    /// What a smaller car keeps off: what is next to a start or a goal, or touched there.
+    tolerated: Vec<Kept>,
+    /// What wheels keep off.
+    low: Option<Kept>,
 }
 
-/// Obstacles that a smaller footprint must keep clear of: those next to a start or a goal, or
-/// touched there.
+/// Obstacles, and the part of the car that keeps off them.
 #[derive(Clone, Debug)]
-struct Tolerated {
+struct Kept {
     index: EdgeIndex,
     footprint: Aabb,
+    /// What of the footprint is taken up, where that is not all of it.
+    contour: Option<Contour>,
+}
+
+impl Kept {
+    /// Some contact of the motion of `sweep`, that of this footprint.
+    #[inline]
+    fn contact(&self, start: &BodyFrame, sweep: &Sweep) -> Option<Contact> {
+        let near = start.aabb_of(sweep.aabb());
+        self.index.first_near(&near, |a, b| self.is_hit(start, sweep, a, b)).map(Contact)
+    }
+
+    /// Whether the motion meets the edge `a`–`b` of the planning frame.
+    #[inline]
+    fn is_hit(&self, start: &BodyFrame, sweep: &Sweep, a: Vec2, b: Vec2) -> bool {
+        let (a, b) = (start.local(a), start.local(b));
+        let is_swept = |contour: &Contour| contour.sweeps(sweep.segment(), a, b);
+        sweep.hits(a, b) && self.contour.as_ref().is_none_or(is_swept)
+    }
+
+    /// Whether the motion along `segment` touches nothing.
+    fn is_swept_free(&self, start: &BodyFrame, segment: Segment) -> bool {
+        self.contact(start, &Sweep::new(&self.footprint, segment)).is_none()
+    }
+
+    /// Whether the car at `pose` touches nothing.
+    fn is_clear(&self, pose: Pose) -> bool {
+        let body = BodyFrame::new(pose);
+        let touches = |a, b| {
+            let (a, b) = (body.local(a), body.local(b));
+            segment_in_box(a, b, &self.footprint)
+                && self.contour.as_ref().is_none_or(|contour| contour.touches(a, b))
+        };
+        let touched = self.index.first_near(&body.aabb_of(&self.footprint), touches);
+        // No edge touches the car, so it lies wholly inside or outside each polygon.
+        touched.is_none() && !self.index.is_in_polygon(pose.position())
+    }
 }
 
 impl CollisionWorld {
@@ -48,27 +89,52 @@ impl CollisionWorld {
         obstacles: &Obstacles,
         bounds: Option<[Vec2; 4]>,
         vehicle: &Vehicle,
-        margin: f64,
+        margin: impl Into<Margins>,
     ) -> Self {
+        Self::of(obstacles, bounds, vehicle, None, margin)
+    }
+
+    /// [`CollisionWorld::new`] for a vehicle of this contour, which lies within its footprint.
+    pub fn of(
+        obstacles: &Obstacles,
+        bounds: Option<[Vec2; 4]>,
+        vehicle: &Vehicle,
+        contour: Option<&Contour>,
+        margin: impl Into<Margins>,
+    ) -> Self {
+        let margins = margin.into();
+        let (index, footprint) = (EdgeIndex::new(obstacles), vehicle.footprint(margins));
+        let contour = contour.map(|contour| contour.grown(margins));
         Self {
-            index: EdgeIndex::new(obstacles),
+            body: Kept { index, footprint, contour },
             bounds: bounds.map(ConvexBounds::new),
-            footprint: vehicle.footprint(margin),
             tolerated: Vec::new(),
+            low: None,
         }
     }
 
-    /// The same world with more obstacles, from which only `margin` metres are kept, no more than
-    /// from the others; of a negative margin the car may reach so deep into them.
-    pub fn tolerating(mut self, obstacles: &Obstacles, vehicle: &Vehicle, margin: f64) -> Self {
-        let (index, footprint) = (EdgeIndex::new(obstacles), vehicle.footprint(margin));
-        self.tolerated.push(Tolerated { index, footprint });
+    /// The same world with the obstacles of another, from which only that one's margin is kept, no more
+    /// than from this one's; of a negative margin the car may reach so deep into them.
+    pub fn tolerating(mut self, obstacles: CollisionWorld) -> Self {
+        self.tolerated.push(obstacles.body);
+        self
+    }
+
+    /// The same world with low obstacles, from which wheels keep `margin` metres.
+    pub fn keeping_wheels_off(
+        mut self,
+        low: &Obstacles,
+        vehicle: &Vehicle,
+        margin: impl Into<Margins>,
+    ) -> Self {
+        let (index, footprint) = (EdgeIndex::new(low), vehicle.wheel_box(margin));
+        self.low = (!low.is_empty()).then_some(Kept { index, footprint, contour: None });
         self
     }
 
     /// The footprint (margin included) in the vehicle's frame.
     pub fn footprint(&self) -> &Aabb {
-        &self.footprint
+        &self.body.footprint
     }
 
     /// The box around the region the rear axle stays in; `None` without bounds.
@@ -76,10 +142,11 @@ impl CollisionWorld {
         self.bounds.as_ref().map(ConvexBounds::aabb)
     }
 
-    /// Calls `visit` with every edge that may come near `area`; points are edges of length zero.
+    /// Calls `visit` with every edge that may come near `area`; points are edges of length zero. What is low is left
+    /// out.
     pub fn edges_near(&self, area: &Aabb, mut visit: impl FnMut(Vec2, Vec2)) {
-        for index in std::iter::once(&self.index).chain(self.tolerated.iter().map(|t| &t.index)) {
-            index.first_near(area, |a, b| {
+        for kept in std::iter::once(&self.body).chain(&self.tolerated) {
+            kept.index.first_near(area, |a, b| {
                 visit(a, b);
                 false
             });
@@ -92,14 +159,22 @@ impl CollisionWorld {
         if !pose.is_finite() || self.bounds.as_ref().is_some_and(|b| !b.contains(pose.position())) {
             return false;
         }
-        is_clear(&self.index, &self.footprint, pose)
-            && self.tolerated.iter().all(|t| is_clear(&t.index, &t.footprint, pose))
+        self.body.is_clear(pose) && self.others().all(|kept| kept.is_clear(pose))
     }
 
     /// Whether another footprint than this world's touches nothing at `pose`; neither the bounds
     /// nor what is tolerated are looked at.
     pub fn is_free_of(&self, footprint: &Aabb, pose: Pose) -> bool {
-        is_clear(&self.index, footprint, pose)
+        let body = BodyFrame::new(pose);
+        let touches = |a, b| segment_in_box(body.local(a), body.local(b), footprint);
+        let index = &self.body.index;
+        index.first_near(&body.aabb_of(footprint), touches).is_none()
+            && !index.is_in_polygon(pose.position())
+    }
+
+    /// What a part of the car keeps off, or a smaller car.
+    fn others(&self) -> impl Iterator<Item = &Kept> {
+        self.tolerated.iter().chain(&self.low)
     }
 
     /// Whether driving `segment` from the free pose `start` touches nothing.
@@ -107,25 +182,20 @@ impl CollisionWorld {
     /// `start` must be free already (see [`CollisionWorld::pose_is_free`]): only contacts
     /// made by moving are looked for.
     pub fn segment_is_free(&self, start: Pose, segment: Segment) -> bool {
-        self.sweep_is_free(&BodyFrame::new(start), &Sweep::new(&self.footprint, segment))
+        self.sweep_is_free(&BodyFrame::new(start), &Sweep::new(&self.body.footprint, segment))
     }
 
     /// [`CollisionWorld::segment_is_free`] with the sweep of this world's footprint
     /// prepared beforehand, as the search does for its motion primitives.
     pub fn sweep_is_free(&self, start: &BodyFrame, sweep: &Sweep) -> bool {
         self.stays_in_bounds(start, sweep)
-            && self.contact(start, sweep).is_none()
-            && self.tolerates(start, sweep)
+            && self.body.contact(start, sweep).is_none()
+            && self.others_allow(start, sweep)
     }
 
-    /// Whether the motion of `sweep` touches nothing of what is tolerated.
-    fn tolerates(&self, start: &BodyFrame, sweep: &Sweep) -> bool {
-        self.tolerated.iter().all(|t| {
-            let sweep = Sweep::new(&t.footprint, sweep.segment());
-            let near = start.aabb_of(sweep.aabb());
-            let hit = |a, b| sweep.hits(start.local(a), start.local(b));
-            t.index.first_near(&near, hit).is_none()
-        })
+    /// Whether the motion of `sweep` is free for all parts of the car and smaller cars.
+    fn others_allow(&self, start: &BodyFrame, sweep: &Sweep) -> bool {
+        self.others().all(|kept| kept.is_swept_free(start, sweep.segment()))
     }
 
     fn stays_in_bounds(&self, start: &BodyFrame, sweep: &Sweep) -> bool {
@@ -141,14 +211,9 @@ impl CollisionWorld {
     /// Whether a sweep of any footprint, free at its start, touches nothing; neither the bounds nor
     /// what is tolerated are looked at.
     pub fn is_swept_free(&self, start: &BodyFrame, sweep: &Sweep) -> bool {
-        self.contact(start, sweep).is_none()
-    }
-
-    /// Some contact of the motion with an obstacle; the bounds are not looked at.
-    fn contact(&self, start: &BodyFrame, sweep: &Sweep) -> Option<Contact> {
         let near = start.aabb_of(sweep.aabb());
         let hit = |a, b| sweep.hits(start.local(a), start.local(b));
-        self.index.first_near(&near, hit).map(Contact)
+        self.body.index.first_near(&near, hit).is_none()
     }
 
     /// [`CollisionWorld::sweep_is_free`] for many motions in turn, most of them not free: what the
@@ -161,15 +226,15 @@ impl CollisionWorld {
         sweep: &Sweep,
     ) -> bool {
         let again = |&Contact(edge): &Contact| {
-            let touches = |(a, b)| sweep.hits(start.local(a), start.local(b));
-            self.index.edge(edge).is_some_and(touches)
+            let touches = |(a, b)| self.body.is_hit(start, sweep, a, b);
+            self.body.index.edge(edge).is_some_and(touches)
         };
         if suspect.as_ref().is_some_and(again) {
             return false;
         }
-        let contact = self.contact(start, sweep);
+        let contact = self.body.contact(start, sweep);
         *suspect = contact.or(*suspect);
-        contact.is_none() && self.stays_in_bounds(start, sweep) && self.tolerates(start, sweep)
+        contact.is_none() && self.stays_in_bounds(start, sweep) && self.others_allow(start, sweep)
     }
 
     /// Whether driving all `segments` from the free pose `start` touches nothing.
@@ -197,7 +262,7 @@ impl CollisionWorld {
         }
         let legs = starts.iter().zip(segments);
         let mut is_free = |(from, &s): (&BodyFrame, &Segment)| {
-            self.sweep_is_free_of(suspect, from, &Sweep::new(&self.footprint, s))
+            self.sweep_is_free_of(suspect, from, &Sweep::new(&self.body.footprint, s))
         };
         legs.rev().all(&mut is_free)
             && (beyond.is_empty() || self.segments_are_free_of(suspect, frame.pose, beyond))
@@ -209,16 +274,6 @@ impl CollisionWorld {
         self.pose_is_free(path.start)
             && path.legs().all(|(from, s)| is_finite(s) && self.segment_is_free(from, s))
     }
-}
-
-/// Whether `footprint` at `pose` touches no edge of `index` and lies in none of its polygons.
-fn is_clear(index: &EdgeIndex, footprint: &Aabb, pose: Pose) -> bool {
-    let body = BodyFrame::new(pose);
-    let near = body.aabb_of(footprint);
-    let touches =
-        index.first_near(&near, |a, b| segment_in_box(body.local(a), body.local(b), footprint));
-    // No edge touches the footprint, so it lies wholly inside or outside each polygon.
-    touches.is_none() && !index.is_in_polygon(pose.position())
 }
 
 /// A pose with its sine and cosine, to see obstacles from the vehicle.

@@ -17,6 +17,9 @@ use std::f64::consts::TAU;
 use crate::curves::Segment;
 use crate::geometry::{Aabb, Vec2, segment_in_box};
 
+/// Turns below this (radians) are straights: over the longest segment they bend by less than a nanometre.
+pub(super) const STRAIGHT_TURN: f64 = 1e-11;
+
 /// A segment and a footprint, prepared for many tests.
 #[derive(Clone, Debug)]
 pub struct Sweep {
@@ -51,14 +54,10 @@ struct ArcSweep {
 }
 
 impl Sweep {
-    /// Turns below this (radians) are straights: over the longest segment they bend by
-    /// less than a nanometre.
-    const STRAIGHT_TURN: f64 = 1e-11;
-
     /// The sweep of `footprint` (vehicle frame) along `segment`.
     pub fn new(footprint: &Aabb, segment: Segment) -> Self {
         let turn = segment.turn();
-        if turn.abs() < Self::STRAIGHT_TURN {
+        if turn.abs() < STRAIGHT_TURN {
             let mut aabb = *footprint;
             aabb.min.x += segment.length.min(0.0);
             aabb.max.x += segment.length.max(0.0);

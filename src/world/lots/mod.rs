@@ -64,12 +64,10 @@ pub fn lot(vehicle: &Vehicle, kind: ParkingType, seed: u64, index: u64) -> Scene
         vehicle: *vehicle,
         start: frame.world_from_local(sized(park.start)),
         goal: frame.world_from_local(sized(park.goal)),
-        goals: Vec::new(),
-        goal_tolerance: None,
         parking_type: Some(kind),
         obstacles: solids.chain(lines).collect(),
         points: things.points.iter().map(point).collect(),
-        bounds: None,
+        ..Scene::default()
     };
     let bounds = draw.chance(BOUNDED).then(|| bounds(&scene, unit));
     Scene { bounds, ..scene }

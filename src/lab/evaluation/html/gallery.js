@@ -189,6 +189,8 @@
     run?.regions?.forEach((r, i) => element("polygon", { points: points(s, r), class: i ? "spot" : "lane" }, regions));
     const obstacles = layer("obstacles");
     for (const o of s.obstacles) element("polygon", { points: points(s, o), class: "obstacle" }, obstacles);
+    for (const o of s.lines) element("polyline", { points: points(s, o), class: "wall" }, obstacles);
+    for (const o of s.borders) element("polygon", { points: points(s, o), class: "wall" }, obstacles);
     for (const p of s.points) {
       const [cx, cy] = local(s, p);
       element("circle", { cx, cy, r: 0.06, class: "point" }, obstacles);

@@ -14,7 +14,7 @@ use crate::episode::Case;
 use crate::episode::Row;
 use crate::geometry::{Aabb, Pose, Vec2};
 use crate::vehicle::Vehicle;
-use crate::world::Scene;
+use crate::world::{Outline, Scene, Shape};
 
 /// Scenes shown of each type and level, the first ones.
 pub const FIRST: usize = 10;
@@ -74,6 +74,10 @@ pub struct SceneView {
     pub view: [f64; 4],
     /// Polygons near what is shown.
     pub obstacles: Vec<Vec<[f64; 2]>>,
+    /// Walls near what is shown.
+    pub lines: Vec<Vec<[f64; 2]>>,
+    /// The border of the drivable area.
+    pub borders: Vec<Vec<[f64; 2]>>,
     /// Points near what is shown.
     pub points: Vec<[f64; 2]>,
     /// The scene's bounds.
@@ -184,10 +188,12 @@ impl SceneView {
     fn new(case: &Case, vehicle: usize, runs: Vec<Run>) -> Self {
         let scene = &case.scene;
         let view = view(scene, &runs).inflated(PADDING);
-        let is_near = |o: &Vec<Vec2>| Aabb::around(o.iter().copied()).intersects(&view);
-        let (points, outlines): (Vec<_>, Vec<_>) =
-            scene.outlines().filter(is_near).partition(|o| o.len() == 1);
-        let pair = |v: &Vec2| [mm(v.x), mm(v.y)];
+        let is_near = |o: &Outline| Aabb::around(o.points()).intersects(&view);
+        let near: Vec<Outline> = scene.outlines().filter(is_near).collect();
+        let of = |shapes: &[Shape]| -> Vec<Vec<[f64; 2]>> {
+            let chosen = near.iter().filter(|o| shapes.contains(&o.shape));
+            chosen.map(|o| o.points().map(|v| [mm(v.x), mm(v.y)]).collect()).collect()
+        };
         Self {
             name: scene.name.clone(),
             kind: case.kind.map_or("–", |k| k.name()).to_owned(),
@@ -196,8 +202,10 @@ impl SceneView {
             start: scene.start,
             goal: scene.goal,
             view: [view.min.x, view.min.y, view.max.x, view.max.y].map(mm),
-            obstacles: outlines.iter().map(|o| o.iter().map(pair).collect()).collect(),
-            points: points.iter().flatten().map(pair).collect(),
+            obstacles: of(&[Shape::Solid]),
+            lines: of(&[Shape::Chain]),
+            borders: of(&[Shape::Border]),
+            points: of(&[Shape::Point]).concat(),
             bounds: scene.bounds.map(|b| b.map(mm)),
             runs,
         }

@@ -6,9 +6,11 @@ use parry2d_f64::math::{Pose2, Vector2};
 use parry2d_f64::query::{self, PointQuery};
 use parry2d_f64::shape::{Cuboid, Segment};
 use parry2d_f64::transformation::convex_polygons_intersection_points;
+use parry2d_f64::utils::point_in_poly2d;
 
 use super::PENETRATION_TOL;
 use crate::vehicle::Vehicle;
+use crate::world::Shape;
 
 /// A motion whose curvature changes steadily from one value to another, 1/m, over a signed length, metres.
 #[derive(Clone, Copy)]
@@ -88,46 +90,95 @@ impl Extent {
     }
 }
 
-/// A solid polygon with its edges.
+/// A polygon or a chain of walls, with its edges.
 pub(super) struct Solid {
-    pub vertices: Vec<Vector2>,
+    /// What it is called in the scene.
+    pub name: String,
+    pub is_low: bool,
+    /// Those of what it fills; none where it fills nothing.
+    pub filled: Vec<Vector2>,
     pub extent: Extent,
     pub edges: Vec<(Segment, Extent)>,
 }
 
 impl Solid {
-    pub fn new(vertices: Vec<Vector2>) -> Self {
+    pub fn new(name: String, is_low: bool, shape: Shape, vertices: Vec<Vector2>) -> Self {
+        let closing = usize::from(shape != Shape::Chain);
         let next = vertices.iter().cycle().skip(1);
-        let edges = vertices.iter().zip(next);
+        let edges = vertices.iter().zip(next).take(vertices.len() - 1 + closing);
         Self {
+            name,
+            is_low,
             extent: Extent::around(&vertices),
             edges: edges.map(|(&a, &b)| (Segment::new(a, b), Extent::around(&[a, b]))).collect(),
-            vertices,
+            filled: if shape == Shape::Solid { vertices } else { Vec::new() },
         }
     }
 }
 
-/// The footprint at one pose.
+/// The footprint at one pose, or the rectangle around its wheels.
 pub(super) struct Body {
     pub pose: Pose2,
     pub half: Vector2,
     pub extent: Extent,
+    /// The rear axle.
+    axle: Vector2,
+    /// The outline within the rectangle, where it is not all of it: counter-clockwise.
+    outline: Vec<Vector2>,
 }
 
 impl Body {
     pub fn new(vehicle: &Vehicle, at: State) -> Self {
+        Self::between(at, [-vehicle.rear_overhang, vehicle.length - vehicle.rear_overhang], vehicle)
+    }
+
+    /// The car with an outline given in its own frame.
+    pub fn outlined(vehicle: &Vehicle, outline: &[Vector2], at: State) -> Self {
+        let turned = Pose2::new(at.position, at.heading);
+        let outline = outline.iter().map(|&v| turned * v).collect();
+        Self { outline, ..Self::new(vehicle, at) }
+    }
+
+    /// The rectangle around the wheels, which reach 0.12 wheelbases ahead of and behind their axles.
+    pub fn wheels(vehicle: &Vehicle, at: State) -> Self {
+        let radius = 0.12 * vehicle.wheelbase;
+        let front = (vehicle.wheelbase + radius).min(vehicle.length - vehicle.rear_overhang);
+        Self::between(at, [-radius.min(vehicle.rear_overhang), front], vehicle)
+    }
+
+    /// The rectangle from one x in the vehicle's frame to another, as wide as the vehicle.
+    fn between(at: State, [rear, front]: [f64; 2], vehicle: &Vehicle) -> Self {
         let (sin, cos) = at.heading.sin_cos();
-        let offset = vehicle.length / 2.0 - vehicle.rear_overhang;
-        let center = at.position + Vector2::new(cos, sin) * offset;
-        let half = Vector2::new(vehicle.length, vehicle.width) / 2.0;
+        let center = at.position + Vector2::new(cos, sin) * ((rear + front) / 2.0);
+        let half = Vector2::new(front - rear, vehicle.width) / 2.0;
         let (sin, cos) = (sin.abs(), cos.abs());
         let reach = Vector2::new(cos * half.x + sin * half.y, sin * half.x + cos * half.y);
         let extent = Extent { min: center - reach, max: center + reach };
-        Self { pose: Pose2::new(center, at.heading), half, extent }
+        let pose = Pose2::new(center, at.heading);
+        Self { pose, half, extent, axle: at.position, outline: Vec::new() }
     }
 
-    pub fn center(&self) -> Vector2 {
-        self.pose.translation
+    /// A point that lies within it in any case.
+    pub fn inside(&self) -> Vector2 {
+        if self.outline.is_empty() { self.pose.translation } else { self.axle }
+    }
+
+    /// The outline, smaller by `margin` metres along the bisector at each corner.
+    fn shrunk_outline(&self, margin: f64) -> Vec<Vector2> {
+        let n = self.outline.len();
+        let corner = |i: usize| {
+            let [a, b, c] = [i + n - 1, i, i + 1].map(|k| self.outline[k % n]);
+            let inward = |v: Vector2| Vector2::new(-v.y, v.x).normalize();
+            let (before, after) = (inward(b - a), inward(c - b));
+            let between = before + after;
+            b + between * (2.0 * margin / between.length_squared().max(0.1))
+        };
+        (0..n).map(corner).collect()
+    }
+
+    fn outline_edges(outline: &[Vector2]) -> impl Iterator<Item = Segment> {
+        let next = outline.iter().cycle().skip(1);
+        outline.iter().zip(next).map(|(&a, &b)| Segment::new(a, b))
     }
 
     /// Share of the footprint that `other`, of the same vehicle, covers.
@@ -149,24 +200,68 @@ impl Body {
         Cuboid::new((self.half - Vector2::splat(margin)).max(Vector2::splat(1e-9)))
     }
 
-    pub fn distance_to_edge(&self, edge: &Segment) -> f64 {
-        query::distance(&self.pose, &self.shrunk(0.0), &Pose2::IDENTITY, edge)
+    /// Distance from an edge; where it is no less than `nearest`, some number that is no less either.
+    pub fn distance_to_edge(&self, edge: &Segment, nearest: f64) -> f64 {
+        let distance = query::distance(&self.pose, &self.shrunk(0.0), &Pose2::IDENTITY, edge)
             .expect("parry measures boxes and segments")
-            .distance
+            .distance;
+        self.refined(distance, nearest, edge)
     }
 
-    pub fn distance_to_point(&self, point: Vector2) -> f64 {
-        self.shrunk(0.0).distance_to_point(&self.pose, point, true)
+    /// The outline's distance, where there is one and the rectangle's is less than `nearest`.
+    fn refined(&self, distance: f64, nearest: f64, edge: &Segment) -> f64 {
+        match distance < nearest {
+            true => self.outline_distance(edge).unwrap_or(distance),
+            false => distance,
+        }
+    }
+
+    /// Distance of the outline, where it has one, from an edge.
+    fn outline_distance(&self, edge: &Segment) -> Option<f64> {
+        if self.outline.is_empty() {
+            return None;
+        }
+        if point_in_poly2d(edge.a, &self.outline) {
+            return Some(0.0);
+        }
+        let to = |own: Segment| {
+            query::distance(&Pose2::IDENTITY, &own, &Pose2::IDENTITY, edge)
+                .expect("parry measures segments")
+                .distance
+        };
+        Some(Self::outline_edges(&self.outline).map(to).fold(f64::INFINITY, f64::min))
+    }
+
+    fn outline_touches(&self, edge: &Segment, margin: f64) -> bool {
+        let outline = self.shrunk_outline(margin);
+        let meets = |own: Segment| {
+            query::intersection_test(&Pose2::IDENTITY, &own, &Pose2::IDENTITY, edge)
+                .expect("parry intersects segments")
+                .intersecting
+        };
+        point_in_poly2d(edge.a, &outline) || Self::outline_edges(&outline).any(meets)
+    }
+
+    /// [`Body::distance_to_edge`] for a point.
+    pub fn distance_to_point(&self, point: Vector2, nearest: f64) -> f64 {
+        let distance = self.shrunk(0.0).distance_to_point(&self.pose, point, true);
+        self.refined(distance, nearest, &Segment::new(point, point))
     }
 
     pub fn touches_edge(&self, edge: &Segment, margin: f64) -> bool {
+        // How deep it lies in the rectangle says enough; whether it does at all the outline says.
+        if !self.outline.is_empty() && !self.outline_touches(edge, PENETRATION_TOL) {
+            return false;
+        }
         query::intersection_test(&self.pose, &self.shrunk(margin), &Pose2::IDENTITY, edge)
             .expect("parry intersects boxes and segments")
             .intersecting
     }
 
     pub fn touches_point(&self, point: Vector2, margin: f64) -> bool {
-        self.shrunk(margin).contains_point(&self.pose, point)
+        let touches = || self.outline_touches(&Segment::new(point, point), PENETRATION_TOL);
+        (self.outline.is_empty() || touches())
+            && self.shrunk(margin).contains_point(&self.pose, point)
     }
 
     /// How deep something reaches in, millimetres: the shrinking that frees the

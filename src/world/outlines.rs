@@ -1,0 +1,252 @@
+//! What stands in a scene, as it is given: outlines and what they mean.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::scene::InvalidField;
+use super::{ObstacleError, Obstacles, Scene};
+use crate::geometry::{Polygon, Polyline, Pose, Vec2, is_within};
+
+/// What only wheels must keep off, such as kerbs and wheel stops: the body passes over it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LowObstacles {
+    /// Simple polygons, closed implicitly; two vertices are a line.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub obstacles: Vec<Vec<[f64; 2]>>,
+    /// Open chains of two or more vertices.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub polylines: Vec<Vec<[f64; 2]>>,
+    /// Single points.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub points: Vec<[f64; 2]>,
+}
+
+impl LowObstacles {
+    /// Whether there is nothing.
+    pub fn is_empty(&self) -> bool {
+        self.obstacles.is_empty() && self.polylines.is_empty() && self.points.is_empty()
+    }
+}
+
+/// Where the car's body must stay: within a simple polygon and out of its holes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DrivableArea {
+    /// The border, closed implicitly.
+    pub outer: Vec<[f64; 2]>,
+    /// What is left out of it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub holes: Vec<Vec<[f64; 2]>>,
+}
+
+impl DrivableArea {
+    /// Whether a point lies within the border (on it, it may go either way); holes are not looked at.
+    pub fn contains(&self, p: Vec2) -> bool {
+        let next = self.outer.iter().cycle().skip(1);
+        let point = |&[x, y]: &[f64; 2]| Vec2::new(x, y);
+        is_within(p, self.outer.iter().zip(next).map(|(a, b)| (point(a), point(b))))
+    }
+}
+
+/// How the vertices of an outline belong together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shape {
+    /// A solid polygon.
+    Solid,
+    /// The closed border of the drivable area.
+    Border,
+    /// Walls one after the other, not closed.
+    Chain,
+    /// A single point.
+    Point,
+}
+
+/// One thing that a car must keep off.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outline<'a> {
+    /// The list of the scene that holds it.
+    list: &'static str,
+    /// Its index there; none where there is but one.
+    index: Option<usize>,
+    /// How its vertices belong together.
+    pub shape: Shape,
+    /// Its vertices, in the scene's frame.
+    pub vertices: &'a [[f64; 2]],
+    /// Whether it is low: only wheels must keep off.
+    pub is_low: bool,
+}
+
+impl Outline<'_> {
+    /// Its vertices as vectors.
+    pub fn points(&self) -> impl Iterator<Item = Vec2> + '_ {
+        self.vertices.iter().map(|&[x, y]| Vec2::new(x, y))
+    }
+
+    /// It alone as geometry, in the scene's frame.
+    pub fn geometry(&self) -> Result<Obstacles, ObstacleError> {
+        geometry(std::iter::once(*self), |v| v)
+    }
+
+    /// Its edges: the last vertex leads to the first where it is closed, and to itself elsewhere, so that every vertex
+    /// begins one edge.
+    pub fn edges(&self) -> impl Iterator<Item = (Vec2, Vec2)> + '_ {
+        let last = match self.shape {
+            Shape::Solid | Shape::Border => self.vertices.first(),
+            Shape::Chain | Shape::Point => self.vertices.last(),
+        };
+        let last = last.map(|&[x, y]| Vec2::new(x, y));
+        self.points().zip(self.points().skip(1).chain(last))
+    }
+}
+
+impl fmt::Display for Outline<'_> {
+    /// The field of the scene, such as `obstacles[3]`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let low = if self.is_low { "low." } else { "" };
+        write!(f, "{low}{}", self.list)?;
+        self.index.map_or(Ok(()), |i| write!(f, "[{i}]"))
+    }
+}
+
+/// Polygons, chains and points, one after the other.
+fn listed<'a>(
+    obstacles: &'a [Vec<[f64; 2]>],
+    polylines: &'a [Vec<[f64; 2]>],
+    points: &'a [[f64; 2]],
+    is_low: bool,
+) -> impl Iterator<Item = Outline<'a>> {
+    let outline = move |list, shape| {
+        move |(i, vertices): (usize, &'a [[f64; 2]])| {
+            // Two vertices enclose nothing.
+            let shape =
+                if shape == Shape::Solid && vertices.len() == 2 { Shape::Chain } else { shape };
+            Outline { list, index: Some(i), shape, vertices, is_low }
+        }
+    };
+    let each = |lists: &'a [Vec<[f64; 2]>]| lists.iter().map(Vec::as_slice).enumerate();
+    let points = points.chunks(1).enumerate().map(outline("points", Shape::Point));
+    each(obstacles)
+        .map(outline("obstacles", Shape::Solid))
+        .chain(each(polylines).map(outline("polylines", Shape::Chain)))
+        .chain(points)
+}
+
+impl Scene {
+    /// Everything that a car must keep off: what stands there, the border of the drivable area and its holes, and what is
+    /// low. Points come last of those that are not low.
+    pub fn outlines(&self) -> impl Iterator<Item = Outline<'_>> {
+        let LowObstacles { obstacles, polylines, points } = &self.low;
+        self.high_outlines().chain(listed(obstacles, polylines, points, true))
+    }
+
+    /// [`Scene::outlines`] without what is low.
+    pub fn high_outlines(&self) -> impl Iterator<Item = Outline<'_>> {
+        let area = self.drivable_area.iter().flat_map(|area| {
+            let part = |list, index, shape, vertices| Outline {
+                list,
+                index,
+                shape,
+                vertices,
+                is_low: false,
+            };
+            let border = part("drivable_area.outer", None, Shape::Border, &area.outer[..]);
+            let holes = area.holes.iter().enumerate().map(move |(i, hole)| {
+                part("drivable_area.holes", Some(i), Shape::Solid, &hole[..])
+            });
+            std::iter::once(border).chain(holes)
+        });
+        let (solid, points): (&[_], &[_]) = (&self.obstacles, &self.points);
+        listed(solid, &self.polylines, &[], false).chain(area).chain(listed(
+            &[],
+            &[],
+            points,
+            false,
+        ))
+    }
+
+    /// Whether the middle of the car at `pose` lies within the drivable area, if there is one.
+    pub fn is_in_area(&self, pose: Pose) -> bool {
+        let middle = self.vehicle.body_center(pose).position();
+        self.drivable_area.as_ref().is_none_or(|area| area.contains(middle))
+    }
+
+    /// What stands in the way of a car's body as geometry, in the scene's frame.
+    pub fn geometry(&self) -> Result<Obstacles, ObstacleError> {
+        self.geometry_by(|v| v)
+    }
+
+    /// [`Scene::geometry`] with every point mapped by `map`.
+    pub fn geometry_by(&self, map: impl Fn(Vec2) -> Vec2) -> Result<Obstacles, ObstacleError> {
+        geometry(self.high_outlines(), map)
+    }
+
+    /// What stands in the way of wheels alone, every point mapped by `map`.
+    pub fn low_geometry_by(&self, map: impl Fn(Vec2) -> Vec2) -> Result<Obstacles, ObstacleError> {
+        let LowObstacles { obstacles, polylines, points } = &self.low;
+        geometry(listed(obstacles, polylines, points, true), map)
+    }
+
+    /// Checks that every outline has enough vertices and `numbers` of each.
+    pub(super) fn check_outlines(
+        &self,
+        numbers: impl Fn(&dyn Fn() -> String, &[f64]) -> Result<(), InvalidField>,
+    ) -> Result<(), InvalidField> {
+        for outline in self.outlines() {
+            for (j, vertex) in outline.vertices.iter().enumerate() {
+                let field = || match outline.shape {
+                    Shape::Point => outline.to_string(),
+                    _ => format!("{outline}[{j}]"),
+                };
+                numbers(&field, vertex)?;
+            }
+            // Of `obstacles` two vertices are a wall; of the area's parts nothing is.
+            let is_area = outline.list.starts_with("drivable_area");
+            let (needed, what) = match (outline.list, is_area) {
+                ("points", _) => continue,
+                (_, true) => (3, "expected at least 3"),
+                ("polylines", _) => (2, "a polyline needs at least 2"),
+                _ => (2, r#"a polygon needs at least 3, a wall 2 (or use "points")"#),
+            };
+            if outline.vertices.len() < needed {
+                let vertices = match outline.vertices.len() {
+                    0 => "no vertices".to_owned(),
+                    1 => "1 vertex".to_owned(),
+                    n => format!("{n} vertices"),
+                };
+                let message = format!("has {vertices}; {what}");
+                return Err(InvalidField { field: outline.to_string(), message });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn geometry<'a>(
+    outlines: impl Iterator<Item = Outline<'a>>,
+    map: impl Fn(Vec2) -> Vec2,
+) -> Result<Obstacles, ObstacleError> {
+    let (mut polygons, mut walls, mut points) = (Vec::new(), Vec::new(), Vec::new());
+    for outline in outlines {
+        let mut vertices = outline.points().map(&map);
+        let added = match outline.shape {
+            Shape::Point => {
+                points.extend(vertices);
+                continue;
+            }
+            Shape::Solid => Polygon::new(vertices.collect()).map(|polygon| polygons.push(polygon)),
+            Shape::Chain => Polyline::new(vertices.collect()).map(|wall| walls.push(wall)),
+            Shape::Border => {
+                let first = vertices.next();
+                let ring = first.into_iter().chain(vertices).chain(first).collect();
+                Polyline::new(ring).map(|wall| walls.push(wall))
+            }
+        };
+        added.map_err(|fault| {
+            let kind = if outline.shape == Shape::Solid { "polygon" } else { "polyline" };
+            ObstacleError::Shape { kind, index: outline.index.unwrap_or(0), fault }
+        })?;
+    }
+    Obstacles::new(polygons, walls, points)
+}
