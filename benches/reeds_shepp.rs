@@ -58,8 +58,13 @@ fn bench(c: &mut Criterion) {
         .collect();
     let mut next = curves.iter().cycle();
     let (turned_at_changes, sharpness) = (true, &[4.0 / (radius * radius)]);
-    let smoothing =
-        Smoothing { turned_at_start: false, turned_at_changes, sharpness, last_straight: 0.0 };
+    let smoothing = Smoothing {
+        begin: 0.0,
+        turned_at_start: false,
+        turned_at_changes,
+        sharpness,
+        last_straight: 0.0,
+    };
     group.bench_function("smooth", |b| {
         b.iter(|| {
             let path = next.next().expect("endless");

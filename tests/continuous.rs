@@ -241,6 +241,7 @@ fn smoothed_curves_end_where_they_did() {
         let sharpness = [8.0 / (radius * radius), 30.0 / (radius * radius)];
         for turned_at_changes in [true, false] {
             let smoothing = Smoothing {
+                begin: 0.0,
                 turned_at_start: false,
                 turned_at_changes,
                 sharpness: &sharpness,
@@ -267,6 +268,7 @@ fn smoothed_curves_end_where_they_did() {
 fn straight_ahead_is_driven_as_it_is() {
     let path = Path::new(Pose::new(1.0, 2.0, 0.5), [Segment::straight(7.0)]);
     let smoothing = Smoothing {
+        begin: 0.0,
         turned_at_start: false,
         turned_at_changes: true,
         sharpness: &[0.2],

@@ -11,6 +11,8 @@ use crate::vehicle::{Gear, Vehicle};
 pub struct SmoothPath {
     /// Where it begins.
     pub start: Pose,
+    /// The curvature that the wheels stand for before the car moves, 1/m.
+    pub begin: f64,
     /// The motions, in driving order.
     pub motions: Vec<Clothoid>,
 }
@@ -35,7 +37,11 @@ pub(super) fn jumps(from: f64, to: f64) -> bool {
 impl SmoothPath {
     /// The motions of `path` as they are.
     pub fn of(path: &Path) -> Self {
-        Self { start: path.start, motions: path.segments.iter().map(|&s| s.into()).collect() }
+        Self {
+            start: path.start,
+            begin: 0.0,
+            motions: path.segments.iter().map(|&s| s.into()).collect(),
+        }
     }
 
     /// Each motion with the pose it starts from.
@@ -73,10 +79,9 @@ impl SmoothPath {
         self.motions.windows(2).filter(jumps).count()
     }
 
-    /// Whether the steering wheel is turned at standstill: `[at the start, at a change of gear]`, where the
-    /// wheels are straight before the start.
+    /// Whether the steering wheel is turned at standstill: `[at the start, at a change of gear]`.
     pub fn turns_at_standstill(&self) -> [bool; 2] {
-        let start = self.motions.first().is_some_and(|c| c.from != 0.0);
+        let start = self.motions.first().is_some_and(|c| jumps(self.begin, c.from));
         let turns = |w: &[Clothoid]| w[0].gear() != w[1].gear() && jumps(w[0].to, w[1].from);
         [start, self.motions.windows(2).any(turns)]
     }
@@ -90,6 +95,7 @@ impl SmoothPath {
         };
         Self {
             start: frame.world_from_local(self.start),
+            begin: frame.flip_curvature(self.begin),
             motions: self.motions.iter().map(flip).collect(),
         }
     }

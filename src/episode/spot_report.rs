@@ -68,7 +68,7 @@ pub fn abstraction(episode: &Episode, models: &Models) -> Option<(Abstraction, G
     episode.result.guidance.as_ref()?;
     let method: Method = episode.row.method.parse().ok()?;
     let grid = *models.selector(method, &problem.vehicle)?.grid(problem.kind?);
-    let found = abstractions(&problem.obstacles, problem.stance()?, &grid);
+    let found = abstractions(problem.around_spot(), problem.stance()?, &grid);
     Some((*found.first()?, grid))
 }
 

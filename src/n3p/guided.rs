@@ -157,7 +157,7 @@ impl GuidedPlanner {
     /// The cells found around the spot, the largest first.
     fn cells(&self, problem: &Problem) -> Vec<Abstraction> {
         let beside = |stance: Stance| {
-            abstractions(&problem.obstacles, stance, self.selector.grid(stance.kind()))
+            abstractions(problem.around_spot(), stance, self.selector.grid(stance.kind()))
         };
         problem.stance().map_or_else(Vec::new, beside)
     }

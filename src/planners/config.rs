@@ -202,7 +202,7 @@ impl HybridAStarConfig {
         let ends = Aabb::around([start.position(), goal.position()]);
         let near = ends.inflated(self.domain_margin);
         let farther = ends.inflated(4.0 * self.domain_margin);
-        let obstacles = problem.obstacles.aabb().inflated(self.domain_margin);
+        let obstacles = problem.collision.obstacles_aabb().inflated(self.domain_margin);
         let whole = Aabb { min: near.min.inf(&obstacles.min), max: near.max.sup(&obstacles.max) };
         let within = |mut domain: Aabb| {
             if let Some(bounds) = problem.collision.bounds_aabb() {

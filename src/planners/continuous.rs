@@ -10,6 +10,7 @@ use super::shape::{ended_straight, lengthened};
 use super::{Budget, Guidance, NoPath, PlanResult, Planner, Problem, Route, keeps_limits};
 use crate::curves::smoothing::{Smoothing, StandstillSteering, smooth};
 use crate::curves::{Path, SmoothPath};
+use crate::geometry::Pose;
 use crate::vehicle::Vehicle;
 
 /// From straight wheels to full lock the gentlest clothoid takes so much of the turning radius, each of the
@@ -35,6 +36,8 @@ fn sharpnesses(vehicle: &Vehicle) -> Vec<f64> {
 struct Wanted {
     standstill: StandstillSteering,
     last_straight: f64,
+    /// Where it is to end, if not where it does.
+    goal: Option<Pose>,
 }
 
 /// A smooth path, and the arcs by which it was checked.
@@ -71,13 +74,13 @@ fn smoothed_from(
     turned_at_start: bool,
     wanted: Wanted,
 ) -> Option<Driven> {
-    let Wanted { standstill, last_straight } = wanted;
+    let Wanted { standstill, last_straight, goal } = wanted;
     let choice = match standstill {
         StandstillSteering::Anywhere => vec![f64::INFINITY],
         _ => sharpnesses(&problem.vehicle),
     };
     let turned_at_changes = standstill != StandstillSteering::Never;
-    let goal = path.end();
+    let goal = goal.unwrap_or_else(|| path.end());
     let mut steps = vec![0; path.direction_changes() + 1];
     let mut sharpness = Vec::with_capacity(steps.len());
     // Each run could be tried with each; what is only a wish is given up sooner.
@@ -86,7 +89,9 @@ fn smoothed_from(
         sharpness.clear();
         sharpness.extend(steps.iter().map(|&step: &usize| choice[step]));
         let sharpness = &sharpness;
-        let smoothing = Smoothing { turned_at_start, turned_at_changes, sharpness, last_straight };
+        let begin = problem.start_curvature;
+        let smoothing =
+            Smoothing { begin, turned_at_start, turned_at_changes, sharpness, last_straight };
         let smooth = smooth(path, goal, &smoothing);
         let touching = match smooth.map(|smooth| checked(problem, smooth, standstill)) {
             Some(Ok(driven)) => return Some(driven),
@@ -146,13 +151,13 @@ fn shaped(problem: &Problem, result: &PlanResult, terms: &Terms) -> Option<PlanR
     let path = result.outcome.as_ref().ok()?;
     let [least_move, last_straight] = terms.lengths(&problem.vehicle);
     let standstill = terms.standstill;
-    let any_end = Wanted { standstill, last_straight: 0.0 };
+    let any_end = Wanted { standstill, last_straight: 0.0, goal: None };
     // Who stops anywhere near the goal has no end to be straight, and who is there already stays.
     let is_free_to_shape = result.covered.is_none() && path.length() > last_straight;
     let longer = lengthened(problem, path, if is_free_to_shape { least_move } else { 0.0 });
     let mut ways = vec![(&longer, any_end)];
     if is_free_to_shape && last_straight > ended_straight(path) {
-        ways.insert(0, (&longer, Wanted { standstill, last_straight }));
+        ways.insert(0, (&longer, Wanted { last_straight, ..any_end }));
     }
     if longer != *path {
         ways.push((path, any_end));
@@ -161,6 +166,19 @@ fn shaped(problem: &Problem, result: &PlanResult, terms: &Terms) -> Option<PlanR
     let result = driven.in_place_of(result.clone());
     let smooth = result.smooth.filter(|_| standstill != StandstillSteering::Anywhere);
     Some(PlanResult { smooth, ..result })
+}
+
+/// `path` fitted to the goal of `problem` and made as smooth as `terms` ask, if it is free then.
+pub(super) fn fitted(problem: &Problem, path: &Path, terms: &Terms) -> Option<PlanResult> {
+    let goal = Some(problem.goal);
+    let wanted = Wanted { standstill: terms.standstill, last_straight: 0.0, goal };
+    let driven = smoothed(problem, path, wanted)?;
+    let result = PlanResult::certified(problem, driven.arcs.clone(), 0);
+    result.outcome.is_ok().then(|| {
+        let result = driven.in_place_of(result);
+        let smooth = result.smooth.filter(|_| terms.standstill != StandstillSteering::Anywhere);
+        PlanResult { smooth, ..result }
+    })
 }
 
 /// A planner's result as `terms` ask for it; where its path cannot be driven so, another that can.
@@ -187,7 +205,7 @@ pub(super) fn driven(
     if result.covered.is_none() {
         HybridAStar::new(planner.config()).first_accepted(problem, &mut spend, |path| {
             looks -= 1;
-            found = smoothed(problem, path, Wanted { standstill, last_straight: 0.0 });
+            found = smoothed(problem, path, Wanted { standstill, last_straight: 0.0, goal: None });
             found.is_some() || looks == 0
         });
     }

@@ -8,9 +8,10 @@
 use super::contact;
 use super::continuous;
 use super::cost::CostModel;
+use super::previous;
 pub use super::problem::Terms;
 use super::{Budget, NoPath, PlanResult, Planner, Problem, ProblemError};
-use crate::curves::{Path, Segment, reeds_shepp};
+use crate::curves::{Path, Segment, SmoothPath, reeds_shepp};
 use crate::geometry::Pose;
 use crate::world::Scene;
 
@@ -257,15 +258,43 @@ pub fn plan(
             best = Some(found);
         }
     }
+    if let Some(kept) = kept(scene, terms, cost) {
+        let is_clearly_better = |b: &Found| b.beats(previous::BETTER * kept.cost);
+        if !best.as_ref().is_some_and(is_clearly_better) {
+            best = Some(kept);
+        }
+    }
     let Some(Found { index: goal_index, problem, result, .. }) = best.or(failed) else {
         return Err(none_free(scene, errors));
     };
-    let result = PlanResult { expansions, ..result };
+    let result = begun(&problem, PlanResult { expansions, ..result });
     let not_free = errors.into_iter().map(|(index, error)| (index, PassedOver::NotFree(error)));
     let no_path = no_path.into_iter().map(|(index, reason)| (index, PassedOver::NoPath(reason)));
     let mut passed_over: Vec<_> = not_free.chain(no_path).collect();
     passed_over.sort_by_key(|(index, _)| *index);
     Ok(Planned { goal_index, problem, result, passed_over })
+}
+
+/// What is left of the scene's previous path, with the goal that it leads to.
+fn kept(scene: &Scene, terms: Terms, cost: CostModel) -> Option<Found> {
+    scene.previous.as_ref()?;
+    (0..scene.all_goals().len()).find_map(|index| {
+        let goal = Goal::new(scene, index, terms, cost);
+        let problem = goal.exact().ok()?.ok().filter(|p| p.contact.is_none())?;
+        let result = previous::kept(scene, &problem, &terms)?;
+        let cost = goal.model.path(&problem.vehicle, &result.outcome.as_ref().ok()?.segments);
+        Some(Found { index, problem, result, cost })
+    })
+}
+
+/// The result, whose path knows how the wheels stand before the car moves.
+fn begun(problem: &Problem, result: PlanResult) -> PlanResult {
+    let begin = problem.start_curvature;
+    if begin == 0.0 || result.smooth.is_some() {
+        return result;
+    }
+    let driven = |path: &Path| SmoothPath { begin, ..SmoothPath::of(path) };
+    PlanResult { smooth: result.outcome.as_ref().ok().map(driven), ..result }
 }
 
 /// The same plan, ended where it first comes within the tolerance.

@@ -30,6 +30,7 @@ mod nearness;
 mod nonholonomic;
 mod open;
 mod plain;
+mod previous;
 mod problem;
 mod scenario;
 mod search;
@@ -185,6 +186,8 @@ pub enum Route {
     Library,
     /// Reeds-Shepp curves alone: no search either.
     Direct,
+    /// What is left of the previous path.
+    Kept,
     /// A search reached the preparatory pose (or left it for the goal).
     Searched,
     /// The full search from start to goal, as the last resort.
@@ -201,6 +204,7 @@ impl Route {
         match self {
             Route::Library => "library",
             Route::Direct => "direct",
+            Route::Kept => "kept",
             Route::Searched => "searched",
             Route::Fallback => "fallback",
             Route::NoLane => "no-lane",
@@ -218,6 +222,7 @@ impl Route {
         match self {
             Route::Library => "a known manoeuvre, joined by one curve; no search",
             Route::Direct => "Reeds-Shepp curves alone; no search",
+            Route::Kept => "what is left of the previous path: nothing is clearly better",
             Route::Searched => "a search by way of a preparatory pose",
             Route::Fallback => "a full search: no known manoeuvre or pose fits here",
             Route::NoLane => "a full search: no free lane of the model's smallest size by the spot",

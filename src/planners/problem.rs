@@ -4,7 +4,7 @@ use super::Shape;
 use super::conflict::Conflict;
 use super::contact::Contact;
 use crate::curves::smoothing::StandstillSteering;
-use crate::geometry::{Frame, Pose, Vec2};
+use crate::geometry::{Aabb, Frame, Pose, Vec2};
 use crate::vehicle::{Gear, Margins, Vehicle};
 use crate::world::cell::{Cell, Grid};
 use crate::world::collision::{CollisionWorld, Contour};
@@ -28,10 +28,15 @@ pub struct Problem {
     pub mouth: f64,
     /// Rear-axle start, planning frame.
     pub start: Pose,
+    /// The curvature that the wheels stand for at the start, 1/m, planning frame.
+    pub start_curvature: f64,
     /// Rear-axle goal, planning frame.
     pub goal: Pose,
     /// The obstacles, planning frame.
     pub obstacles: Obstacles,
+    /// Those that the spot and its lane can be made of, where there are many more: see
+    /// [`Problem::around_spot`].
+    pub(super) around: Option<Obstacles>,
     /// What only wheels keep off, planning frame.
     pub low: Obstacles,
     /// The vehicle's outline within its footprint, where it is not all of it, as seen in the planning frame.
@@ -246,7 +251,7 @@ impl Problem {
 
     fn seen(scene: &Scene, terms: Terms, precision: Precision) -> Result<Problem, ProblemError> {
         scene.check_numbers()?;
-        let SpotGuess { frame, stance, obstacles, mouth } = spot::guess(scene, precision)?;
+        let SpotGuess { frame, stance, obstacles, around, mouth } = spot::guess(scene, precision)?;
         let bounds = scene.bounds.map(|b| spot::bounds_in_frame(b, &frame, precision));
         let start = precision.pose(frame.local_from_world(scene.start));
         let goal = match precision {
@@ -275,6 +280,9 @@ impl Problem {
         let kind = stance.map(Stance::kind);
         let mut problem = Self::checked(scene.vehicle, frame, kind, [start, goal], place, terms)?;
         problem.mouth = mouth;
+        let curvature = scene.vehicle.curvature(scene.start_steer);
+        problem.start_curvature = frame.flip_curvature(curvature);
+        problem.around = around;
         problem.tolerance = scene.goal_tolerance.map(|tolerance| (goal, tolerance));
         Ok(problem)
     }
@@ -317,7 +325,12 @@ impl Problem {
         if !ends_are_free(&collision) {
             // What is next to start or goal keeps the whole plan from the margin, but only from
             // its own: everything else is kept as far away as was asked for.
-            let (kept, mut close) = obstacles.partition(|one| ends_are_free(&alone(one, margin)));
+            let body = |pose: Pose| vehicle.footprint_at(pose).aabb().inflated(2.0 * margin);
+            let [a, b] = [start, goal].map(body);
+            let ends = Aabb { min: a.min.inf(&b.min), max: a.max.sup(&b.max) };
+            let (beside, away) = obstacles.split_at(&ends);
+            let (kept, mut close) = beside.partition(|one| ends_are_free(&alone(one, margin)));
+            let kept = kept.and(away);
             let far = CollisionWorld::of(&kept, bounds, &vehicle, contour.as_ref(), sides);
             let mut touched = Obstacles::default();
             if terms.contact > 0.0 {
@@ -364,8 +377,10 @@ impl Problem {
             kind,
             mouth: 0.0,
             start,
+            start_curvature: 0.0,
             goal,
             obstacles,
+            around: None,
             low,
             contour,
             margins,
@@ -387,6 +402,11 @@ impl Problem {
     fn margins_below(margin: f64, least: f64) -> impl Iterator<Item = f64> {
         let centimetres = (1..100).rev().map(|cm| f64::from(cm) / 100.0);
         centimetres.chain([least]).filter(move |&m| m < margin).chain([0.0])
+    }
+
+    /// The obstacles that the spot and its lane can be made of, and perhaps others.
+    pub fn around_spot(&self) -> &Obstacles {
+        self.around.as_ref().unwrap_or(&self.obstacles)
     }
 
     /// Gears in which a straight may enter the spot: the goal of a bay is the *set* of

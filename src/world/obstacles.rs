@@ -87,6 +87,49 @@ impl Obstacles {
         parts
     }
 
+    /// How many vertices and points there are.
+    pub fn vertices(&self) -> usize {
+        let polygons = self.polygons.iter().map(|p| p.vertices().len());
+        let walls = self.polylines.iter().map(|w| w.vertices().len());
+        polygons.chain(walls).sum::<usize>() + self.points.len()
+    }
+
+    /// Those whose boxes touch `near`, and the others.
+    pub fn split_at(&self, near: &Aabb) -> (Obstacles, Obstacles) {
+        fn split<T: Clone>(all: &[T], is_near: impl Fn(&T) -> bool) -> (Vec<T>, Vec<T>) {
+            all.iter().cloned().partition(is_near)
+        }
+        let (polygons, other_polygons) = split(&self.polygons, |p| p.aabb().intersects(near));
+        let (polylines, other_polylines) = split(&self.polylines, |w| w.aabb().intersects(near));
+        let (points, other_points) = split(&self.points, |p| near.contains(*p));
+        let far = Obstacles {
+            polygons: other_polygons,
+            polylines: other_polylines,
+            points: other_points,
+        };
+        (Obstacles { polygons, polylines, points }, far)
+    }
+
+    /// These and others.
+    pub fn and(mut self, others: Obstacles) -> Obstacles {
+        self.polygons.extend(others.polygons);
+        self.polylines.extend(others.polylines);
+        self.points.extend(others.points);
+        self
+    }
+
+    /// Those whose boxes touch `near`.
+    pub fn within(&self, near: &Aabb) -> Obstacles {
+        fn some<T: Clone>(all: &[T], is_near: impl Fn(&T) -> bool) -> Vec<T> {
+            all.iter().filter(|one| is_near(one)).cloned().collect()
+        }
+        Obstacles {
+            polygons: some(&self.polygons, |p| p.aabb().intersects(near)),
+            polylines: some(&self.polylines, |w| w.aabb().intersects(near)),
+            points: some(&self.points, |p| near.contains(*p)),
+        }
+    }
+
     /// Each of them alone.
     pub fn each(&self) -> impl Iterator<Item = Obstacles> + '_ {
         let none = Obstacles::default;

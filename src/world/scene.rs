@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::goals::GoalTolerance;
 use super::scene_file::{SceneFile, parse_json};
-use super::{DrivableArea, LowObstacles, ParkingType, tpcap};
+use super::{DrivableArea, LowObstacles, ParkingType, PreviousPath, tpcap};
 use crate::files::{reason, write_whole};
 use crate::geometry::Pose;
 use crate::vehicle::{Margins, Vehicle};
@@ -37,6 +37,10 @@ pub struct Scene {
     pub margins: Option<Margins>,
     /// Rear-axle pose to start from.
     pub start: Pose,
+    /// Angle of the front wheels at the start, radians.
+    pub start_steer: f64,
+    /// The path that the car follows already, if there is one.
+    pub previous: Option<PreviousPath>,
     /// Rear-axle pose to park at; of several [`Scene::goals`] the first.
     pub goal: Pose,
     /// Where there is a choice: the poses to park at, of which any will do. Empty where `goal` is
@@ -279,6 +283,13 @@ impl Scene {
             return invalid(format!("vehicle.{}", e.field), message);
         }
         self.check_contour()?;
+        let most = self.vehicle.max_steer;
+        if self.start_steer.is_nan() || self.start_steer.abs() > most + 1e-9 {
+            let message =
+                format!("is {}; expected an angle within ±max_steer, {most} rad", self.start_steer);
+            return invalid("start_steer".to_owned(), message);
+        }
+        self.previous.as_ref().map_or(Ok(()), PreviousPath::check)?;
         if self.goals.len() > Self::MAX_GOALS {
             let (given, most) = (self.goals.len(), Self::MAX_GOALS);
             let message = format!("has {given} poses; expected at most {most}");

@@ -7,7 +7,7 @@ use serde_json::{Value, error::Category};
 
 use super::goals::GoalTolerance;
 use super::scene::{Scene, SceneError};
-use super::{DrivableArea, LowObstacles, ParkingType};
+use super::{DrivableArea, LowObstacles, ParkingType, PreviousPath};
 use crate::geometry::Pose;
 use crate::vehicle::{Margins, Vehicle};
 
@@ -25,6 +25,10 @@ pub(super) struct SceneFile {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     margins: Option<Margins>,
     start: Pose,
+    #[serde(default, skip_serializing_if = "is_straight")]
+    start_steer: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    previous: Option<PreviousPath>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     goal: Option<Pose>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -44,6 +48,10 @@ pub(super) struct SceneFile {
     drivable_area: Option<DrivableArea>,
     #[serde(default)]
     bounds: Option<[f64; 4]>,
+}
+
+fn is_straight(steer: &f64) -> bool {
+    *steer == 0.0
 }
 
 impl TryFrom<SceneFile> for Scene {
@@ -66,6 +74,7 @@ impl TryFrom<SceneFile> for Scene {
         };
         let SceneFile { name, source, vehicle, contour, margins, start, goal_tolerance, .. } = file;
         let SceneFile { parking_type, obstacles, polylines, points, .. } = file;
+        let SceneFile { start_steer, previous, .. } = file;
         let SceneFile { low, drivable_area, bounds, .. } = file;
         Ok(Scene {
             name,
@@ -74,6 +83,8 @@ impl TryFrom<SceneFile> for Scene {
             contour,
             margins,
             start,
+            start_steer,
+            previous,
             goal,
             goals,
             goal_tolerance,
@@ -98,6 +109,8 @@ impl From<Scene> for SceneFile {
             contour: scene.contour,
             margins: scene.margins,
             start: scene.start,
+            start_steer: scene.start_steer,
+            previous: scene.previous,
             goal: one.then_some(scene.goal),
             goals: (!one).then_some(scene.goals),
             goal_tolerance: scene.goal_tolerance,

@@ -75,12 +75,19 @@ pub struct SpotGuess {
     pub stance: Option<Stance>,
     /// The obstacles, seen from the frame.
     pub obstacles: Obstacles,
+    /// Those that the spot and its lane can be made of, where there are many more.
+    pub around: Option<Obstacles>,
     /// How much farther from the parked centre the lane begins than beside a usual spot, metres;
     /// 0 where none was found.
     pub mouth: f64,
 }
 
 impl SpotGuess {
+    /// The obstacles that the spot and its lane can be made of, and perhaps others.
+    pub fn around(&self) -> &Obstacles {
+        self.around.as_ref().unwrap_or(&self.obstacles)
+    }
+
     /// The parking type, given or found.
     pub fn kind(&self) -> Option<ParkingType> {
         self.stance.map(Stance::kind)
@@ -106,7 +113,7 @@ pub fn guess(scene: &Scene, precision: Precision) -> Result<SpotGuess, ObstacleE
     let usual = spot_frame(scene, stance);
     let guess = seen(usual, Some(stance), 0.0)?;
     let grid = grid(scene);
-    if lane_is_open(&guess.obstacles, stance, &grid) {
+    if lane_is_open(guess.around(), stance, &grid) {
         return Ok(guess);
     }
     if let Some(lane) = lane(&guess, &grid) {
@@ -322,12 +329,18 @@ fn seen(
 ) -> Result<SpotGuess, ObstacleError> {
     let view = frame.view();
     let obstacles = scene.geometry_by(|p| precision.point(view(p)))?;
-    Ok(SpotGuess { frame, stance, obstacles, mouth })
+    // More than this, and looking at all of them takes longer than planning.
+    const MANY: usize = 5000;
+    let around = (obstacles.vertices() > MANY).then(|| {
+        let reach = REACH * scene.vehicle.scale();
+        obstacles.within(&Aabb::new(-reach, -reach, reach, reach))
+    });
+    Ok(SpotGuess { frame, stance, obstacles, around, mouth })
 }
 
 /// The largest free lane beside the spot, if there is one.
 fn lane(guess: &SpotGuess, grid: &Grid) -> Option<Abstraction> {
-    abstractions(&guess.obstacles, guess.stance?, grid).first().copied()
+    abstractions(guess.around(), guess.stance?, grid).first().copied()
 }
 
 /// The lane's rectangle in the spot frame; the frame of the cell is not turned here.

@@ -65,7 +65,9 @@ impl FromStr for StandstillSteering {
 /// How a path is made smooth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Smoothing<'a> {
-    /// Whether the wheels may turn at the start, before the car moves; else they are straight there.
+    /// The curvature that the wheels stand for at the start, 1/m.
+    pub begin: f64,
+    /// Whether the wheels may turn at the start, before the car moves.
     pub turned_at_start: bool,
     /// Whether they may turn where the gear changes.
     pub turned_at_changes: bool,
@@ -81,12 +83,13 @@ pub struct Smoothing<'a> {
 ///
 /// Nothing is asked of obstacles. The sharpness of runs beyond those given is that of the last one given.
 pub fn smooth(path: &Path, goal: Pose, smoothing: &Smoothing) -> Option<SmoothPath> {
+    let unwinding = unwinding(path, smoothing);
     let mut pieces = pieces(path, smoothing);
-    if !fit::fit(&mut pieces, path.start, goal) {
+    if !fit::fit(&mut pieces, unwinding.end(path.start), goal) {
         return None;
     }
-    let mut motions: Vec<Clothoid> = Vec::with_capacity(2 * pieces.len());
-    for motion in pieces.iter().flat_map(Piece::motions) {
+    let mut motions: Vec<Clothoid> = Vec::with_capacity(2 * pieces.len() + 1);
+    for motion in std::iter::once(unwinding).chain(pieces.iter().flat_map(Piece::motions)) {
         match motions.last_mut() {
             _ if motion.length.abs() < 1e-9 => {}
             Some(last)
@@ -100,7 +103,25 @@ pub fn smooth(path: &Path, goal: Pose, smoothing: &Smoothing) -> Option<SmoothPa
             _ => motions.push(motion),
         }
     }
-    Some(SmoothPath { start: path.start, motions })
+    Some(SmoothPath { start: path.start, begin: smoothing.begin, motions })
+}
+
+/// The curvature with which the first turn begins, where that is to the side to which the wheels stand already.
+fn begun(first: Segment, smoothing: &Smoothing) -> f64 {
+    let begin = smoothing.begin;
+    let goes_on = begin * first.curvature > 0.0 && begin.abs() <= first.curvature.abs();
+    if goes_on { begin.abs() } else { 0.0 }
+}
+
+/// The clothoid on which the wheels become straight at the start, where they may not turn before; of no length else.
+fn unwinding(path: &Path, smoothing: &Smoothing) -> Clothoid {
+    let Some(&first) = path.segments.first() else { return Clothoid::default() };
+    let begin = smoothing.begin;
+    if smoothing.turned_at_start || begin == 0.0 || begun(first, smoothing) > 0.0 {
+        return Clothoid::default();
+    }
+    let length = first.gear().sign() * begin.abs() / smoothing.sharpness[0];
+    Clothoid { from: begin, to: 0.0, length }
 }
 
 /// The straights and turns of `path`, and straights of no length wherever the wheels are straight between two
@@ -128,7 +149,7 @@ fn pieces(path: &Path, smoothing: &Smoothing) -> Vec<Piece> {
             (!free).then(|| shared(other.curvature, s.curvature))
         };
         let begin = match i {
-            0 => (!smoothing.turned_at_start).then_some(0.0),
+            0 => (!smoothing.turned_at_start).then(|| begun(*s, smoothing)),
             _ => border(Some(i - 1)),
         };
         let is_last = i + 1 == segments.len();

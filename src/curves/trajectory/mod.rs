@@ -5,7 +5,7 @@
 //! On a run the speed rises and falls within the limits of acceleration and jerk, and nowhere exceeds the
 //! vehicle's speed in that gear, what the lateral acceleration allows on a curve, and what the front wheels
 //! can follow on a clothoid. Before a run the wheels turn at standstill to where the run needs them, if they
-//! are not there yet; before the first they are straight.
+//! are not there yet; before the first they stand as [`SmoothPath::begin`] says.
 //!
 //! Where two arcs meet, the curvature of a path jumps. To stay on the path and within the
 //! steering rate a car has to stop there. Without `stop_to_steer` it drives on, and the
@@ -64,8 +64,8 @@ impl Trajectory {
             pose: Pose { heading: wrap_angle(path.start.heading), ..path.start },
             speed: 0.0,
             acceleration: 0.0,
-            steer: 0.0,
-            curvature: 0.0,
+            steer: vehicle.steer(path.begin),
+            curvature: path.begin,
             distance: 0.0,
             gear: Gear::Forward,
         };

@@ -150,7 +150,7 @@ impl<'a> Standard<'a> {
             let usual = Grid::default();
             let parallel_spot_width = Axis { min: LEAST_GAP, ..usual.parallel_spot_width };
             let grid = Grid { parallel_spot_width, ..usual }.scaled(scale);
-            !abstractions(&problem.obstacles, stance, &grid).is_empty()
+            !abstractions(problem.around_spot(), stance, &grid).is_empty()
         };
         let unusual = |stance| problem.mouth > DEEPER * scale || !has_cell(stance);
         *self.unusual.get_or_insert_with(|| problem.stance().is_some_and(unusual))

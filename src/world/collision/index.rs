@@ -2,7 +2,8 @@
 //!
 //! Edges are grouped into clusters of a few that lie together (a polygon's own edges, or
 //! neighbouring points), each with a box. A query tests the boxes one after the other:
-//! for the tens to hundreds of clusters of a parking scene this beats a tree.
+//! for the tens to hundreds of clusters of a parking scene this beats a tree. The clusters of
+//! whole maps lie in a tree of boxes.
 
 use std::ops::Range;
 
@@ -11,69 +12,182 @@ use crate::world::Obstacles;
 
 /// Edges per cluster.
 const CLUSTER: usize = 8;
+/// Clusters are tested one after the other up to so many.
+const FEW: usize = 256;
+/// Boxes under one box of the tree.
+const FAN: usize = 8;
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct EdgeIndex {
-    clusters: Vec<Cluster>,
+    clusters: Clusters,
     /// All edges of each polygon.
-    polygons: Vec<Cluster>,
+    polygons: Clusters,
     edges: Vec<(Vec2, Vec2)>,
 }
 
 /// Edges that lie together.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 struct Cluster {
     aabb: Aabb,
-    /// Which edges of the index.
-    edges: Range<usize>,
+    /// Which edges of the index: the first, and the one after the last.
+    edges: [u32; 2],
+}
+
+impl Cluster {
+    fn edges(&self) -> Range<usize> {
+        self.edges[0] as usize..self.edges[1] as usize
+    }
+}
+
+/// Clusters, and where they are many a tree of boxes over them.
+#[derive(Clone, Debug, Default)]
+struct Clusters {
+    all: Vec<Cluster>,
+    /// Boxes around [`FAN`] boxes each, of the clusters first, up to a level with a few.
+    levels: Vec<Vec<Aabb>>,
+}
+
+impl Clusters {
+    fn new(mut all: Vec<Cluster>) -> Self {
+        let mut levels: Vec<Vec<Aabb>> = Vec::new();
+        if all.len() > FEW {
+            along_a_curve(&mut all, |c| (c.aabb.min + c.aabb.max) * 0.5);
+            let mut below: Vec<Aabb> = all.iter().map(|c| c.aabb).collect();
+            while below.len() > FAN {
+                let around =
+                    |boxes: &[Aabb]| Aabb::around(boxes.iter().flat_map(|b| [b.min, b.max]));
+                let level: Vec<Aabb> = below.chunks(FAN).map(around).collect();
+                levels.push(level.clone());
+                below = level;
+            }
+        }
+        Self { all, levels }
+    }
+
+    /// The first result of `look` at the clusters that touch `near`.
+    #[inline]
+    fn find<T>(&self, near: &Aabb, mut look: impl FnMut(&Cluster) -> Option<T>) -> Option<T> {
+        if self.levels.is_empty() {
+            return Self::find_among(&self.all, near, &mut look);
+        }
+        self.find_below(self.levels.len(), 0, near, &mut look)
+    }
+
+    #[inline]
+    fn find_among<T>(
+        clusters: &[Cluster],
+        near: &Aabb,
+        look: &mut impl FnMut(&Cluster) -> Option<T>,
+    ) -> Option<T> {
+        for cluster in clusters {
+            if cluster.aabb.intersects(near) {
+                let found = look(cluster);
+                if found.is_some() {
+                    return found;
+                }
+            }
+        }
+        None
+    }
+
+    /// [`Clusters::find`] among what is under box `number` of the level above `level`.
+    fn find_below<T>(
+        &self,
+        level: usize,
+        number: usize,
+        near: &Aabb,
+        look: &mut impl FnMut(&Cluster) -> Option<T>,
+    ) -> Option<T> {
+        let part = |length: usize| (number * FAN).min(length)..(number * FAN + FAN).min(length);
+        let Some(below) = level.checked_sub(1) else {
+            return Self::find_among(&self.all[part(self.all.len())], near, look);
+        };
+        let boxes = &self.levels[below];
+        part(boxes.len()).find_map(|i| {
+            boxes[i].intersects(near).then(|| self.find_below(below, i, near, look)).flatten()
+        })
+    }
+}
+
+/// Sorts what lies in the plane along a curve on which neighbours lie together (Morton 1966).
+fn along_a_curve<T: Copy>(all: &mut [T], place: impl Fn(&T) -> Vec2) {
+    let extent = Aabb::around(all.iter().map(&place));
+    let size = extent.max - extent.min;
+    let steps = f64::from(u16::MAX) / size.x.max(size.y).max(f64::MIN_POSITIVE);
+    let spread = |v: f64| {
+        let mut bits = (v * steps) as u32 & 0xffff;
+        for (shift, mask) in
+            [(8, 0x00ff_00ff), (4, 0x0f0f_0f0f), (2, 0x3333_3333), (1, 0x5555_5555)]
+        {
+            bits = (bits | bits << shift) & mask;
+        }
+        bits
+    };
+    let key = |one: &T| {
+        let p = place(one) - extent.min;
+        spread(p.x) | spread(p.y) << 1
+    };
+    let mut keyed: Vec<(u32, T)> = all.iter().map(|one| (key(one), *one)).collect();
+    // Stable, so that the order is that of the scene among equals.
+    keyed.sort_by_key(|(key, _)| *key);
+    all.iter_mut().zip(keyed).for_each(|(slot, (_, one))| *slot = one);
 }
 
 impl EdgeIndex {
     pub fn new(obstacles: &Obstacles) -> Self {
-        let (polygons, walls) = (obstacles.polygons(), obstacles.polylines());
-        let vertices = polygons.iter().map(|p| p.vertices().len()).sum::<usize>()
+        let (solids, walls) = (obstacles.polygons(), obstacles.polylines());
+        let vertices = solids.iter().map(|p| p.vertices().len()).sum::<usize>()
             + walls.iter().map(|w| w.vertices().len()).sum::<usize>();
-        let edges = vertices + obstacles.points().len();
-        let mut index = Self {
-            clusters: Vec::with_capacity(polygons.len() + walls.len() + edges / CLUSTER + 1),
-            polygons: Vec::with_capacity(polygons.len()),
-            edges: Vec::with_capacity(edges),
+        let count = vertices + obstacles.points().len();
+        let mut edges = Vec::with_capacity(count);
+        let mut clusters = Vec::with_capacity(solids.len() + walls.len() + count / CLUSTER + 1);
+        let mut polygons = Vec::with_capacity(solids.len());
+        let mut add = |new: &mut dyn Iterator<Item = (Vec2, Vec2)>| {
+            let first = edges.len();
+            edges.extend(new);
+            for first in (first..edges.len()).step_by(CLUSTER) {
+                let end = edges.len().min(first + CLUSTER);
+                let ends = edges[first..end].iter().flat_map(|&(a, b)| [a, b]);
+                let aabb = Aabb::around(ends);
+                clusters.push(Cluster { aabb, edges: [first, end].map(|i| i as u32) });
+            }
+            [first, edges.len()].map(|i| i as u32)
         };
-        for polygon in polygons {
-            let edges = index.add(polygon.edges());
-            index.polygons.push(Cluster { aabb: polygon.aabb(), edges });
+        for polygon in solids {
+            let edges = add(&mut polygon.edges());
+            polygons.push(Cluster { aabb: polygon.aabb(), edges });
         }
         for wall in walls {
-            index.add(wall.edges());
+            add(&mut wall.edges());
         }
-        // Points in stripes of two metres, so that a cluster's points lie together.
         let mut points = obstacles.points().to_vec();
-        points.sort_by(|a, b| {
-            let stripe = |p: &Vec2| (p.x / 2.0).floor();
-            stripe(a).total_cmp(&stripe(b)).then(a.y.total_cmp(&b.y)).then(a.x.total_cmp(&b.x))
-        });
-        index.add(points.iter().map(|&p| (p, p)));
-        index
+        if points.len() > FEW * CLUSTER {
+            along_a_curve(&mut points, |&p| p);
+        } else {
+            // In stripes of two metres, so that a cluster's points lie together.
+            points.sort_by(|a, b| {
+                let stripe = |p: &Vec2| (p.x / 2.0).floor();
+                let stripes = stripe(a).total_cmp(&stripe(b));
+                stripes.then(a.y.total_cmp(&b.y)).then(a.x.total_cmp(&b.x))
+            });
+        }
+        add(&mut points.iter().map(|&p| (p, p)));
+        Self { clusters: Clusters::new(clusters), polygons: Clusters::new(polygons), edges }
     }
 
-    /// Adds `edges` in clusters; returns their numbers.
-    fn add(&mut self, edges: impl Iterator<Item = (Vec2, Vec2)>) -> Range<usize> {
-        let all = self.edges.len();
-        self.edges.extend(edges);
-        let all = all..self.edges.len();
-        for first in all.clone().step_by(CLUSTER) {
-            let edges = first..all.end.min(first + CLUSTER);
-            let ends = self.edges[edges.clone()].iter().flat_map(|&(a, b)| [a, b]);
-            self.clusters.push(Cluster { aabb: Aabb::around(ends), edges });
+    /// The smallest box around everything.
+    pub fn aabb(&self) -> Aabb {
+        match self.clusters.levels.last() {
+            Some(boxes) => Aabb::around(boxes.iter().flat_map(|b| [b.min, b.max])),
+            None => Aabb::around(self.clusters.all.iter().flat_map(|c| [c.aabb.min, c.aabb.max])),
         }
-        all
     }
 
     /// Whether `p` lies inside a polygon.
     pub fn is_in_polygon(&self, p: Vec2) -> bool {
-        self.polygons.iter().any(|Cluster { aabb, edges }| {
-            aabb.contains(p) && is_within(p, self.edges[edges.clone()].iter().copied())
-        })
+        let at = Aabb { min: p, max: p };
+        let is_in = |c: &Cluster| is_within(p, self.edges[c.edges()].iter().copied()).then_some(());
+        self.polygons.find(&at, is_in).is_some()
     }
 
     /// The first edge for which `hit` holds, of the clusters that touch `near`.
@@ -83,20 +197,42 @@ impl EdgeIndex {
         near: &Aabb,
         mut hit: impl FnMut(Vec2, Vec2) -> bool,
     ) -> Option<usize> {
-        for Cluster { aabb, edges } in &self.clusters {
-            if aabb.intersects(near) {
-                let hit = self.edges[edges.clone()].iter().position(|&(a, b)| hit(a, b));
-                if let Some(i) = hit {
-                    return Some(edges.start + i);
-                }
-            }
-        }
-        None
+        self.clusters.find(near, |cluster| {
+            let edges = cluster.edges();
+            let hit = self.edges[edges.clone()].iter().position(|&(a, b)| hit(a, b));
+            hit.map(|i| edges.start + i)
+        })
     }
 
     /// The edge of a number given by [`EdgeIndex::first_near`]; `None` for a number of another
     /// index that this one does not have.
     pub fn edge(&self, number: usize) -> Option<(Vec2, Vec2)> {
         self.edges.get(number).copied()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tree_finds_what_a_look_at_everything_finds() {
+        let hash = |i: u32, k: u32| f64::from(i.wrapping_mul(k) >> 8) / f64::from(1 << 24) * 300.0;
+        let points: Vec<Vec2> =
+            (1..20_000).map(|i| Vec2::new(hash(i, 2_654_435_761), hash(i, 40_503_007))).collect();
+        let obstacles = Obstacles::new(vec![], vec![], points.clone()).unwrap();
+        let index = EdgeIndex::new(&obstacles);
+        assert!(index.clusters.levels.len() >= 2);
+        assert_eq!(index.aabb(), Aabb::around(points.iter().copied()));
+        for i in 1..200 {
+            let min = Vec2::new(hash(i, 97_003), hash(i, 7_919_111));
+            let near = Aabb { min, max: min + Vec2::new(3.0, 5.0) };
+            let mut seen = 0;
+            index.first_near(&near, |a, _| {
+                seen += usize::from(near.contains(a));
+                false
+            });
+            assert_eq!(seen, points.iter().filter(|&&p| near.contains(p)).count());
+        }
     }
 }

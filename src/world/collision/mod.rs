@@ -142,6 +142,15 @@ impl CollisionWorld {
         self.bounds.as_ref().map(ConvexBounds::aabb)
     }
 
+    /// The smallest box around all that the body keeps off.
+    pub fn obstacles_aabb(&self) -> Aabb {
+        let others = self.tolerated.iter().map(|kept| kept.index.aabb());
+        others.fold(self.body.index.aabb(), |a, b| Aabb {
+            min: a.min.inf(&b.min),
+            max: a.max.sup(&b.max),
+        })
+    }
+
     /// Calls `visit` with every edge that may come near `area`; points are edges of length zero. What is low is left
     /// out.
     pub fn edges_near(&self, area: &Aabb, mut visit: impl FnMut(Vec2, Vec2)) {
