@@ -15,8 +15,8 @@ use crate::output::{Driven, PathFile};
 use crate::planners::cost::CostModel;
 use crate::planners::goals::{self, Terms};
 use crate::planners::{Budget, HybridAStarConfig, NoPath, Planner, ProblemError, Route, Shape};
-use crate::vehicle::{Vehicle, VehicleError};
-use crate::world::{GoalTolerance, ParkingType, Scene};
+use crate::vehicle::{Margins, Vehicle, VehicleError};
+use crate::world::{DrivableArea, GoalTolerance, LowObstacles, ParkingType, PreviousPath, Scene};
 
 /// Plans for one vehicle. Shared between threads by reference: each call borrows a planner of its
 /// own, and what one call leaves behind never changes the result of another.
@@ -280,20 +280,41 @@ pub struct Request {
     pub tolerance: Option<GoalTolerance>,
     /// How the goal lies in its spot, where that is known; it is found otherwise.
     pub parking_type: Option<ParkingType>,
+    /// The car's outline where that is not its whole rectangle: see [`Scene::contour`]; empty where it is.
+    pub contour: Vec<[f64; 2]>,
+    /// Clearance to keep on each side of the car, beyond the parker's.
+    pub margins: Option<Margins>,
+    /// Angle of the front wheels at the start, radians.
+    pub start_steer: f64,
+    /// The path that the car follows already, such as [`Plan::previous`] of the last cycle: it is kept while it is free
+    /// and near the best.
+    pub previous: Option<PreviousPath>,
 }
 
 impl Request {
     /// From `start` exactly to `goal`.
     pub fn new(start: Pose, goal: Pose) -> Self {
-        Self { start, goals: vec![goal], tolerance: None, parking_type: None }
+        Self {
+            start,
+            goals: vec![goal],
+            tolerance: None,
+            parking_type: None,
+            contour: Vec::new(),
+            margins: None,
+            start_steer: 0.0,
+            previous: None,
+        }
     }
 }
 
 /// What stands in a lot, in any frame that start and goal share; metres.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lot {
-    outlines: Vec<Vec<[f64; 2]>>,
+    obstacles: Vec<Vec<[f64; 2]>>,
+    polylines: Vec<Vec<[f64; 2]>>,
     points: Vec<[f64; 2]>,
+    low: LowObstacles,
+    drivable_area: Option<DrivableArea>,
     bounds: Option<[f64; 4]>,
 }
 
@@ -305,19 +326,43 @@ impl Lot {
 
     /// Adds a solid simple polygon, closed implicitly; two vertices are a wall.
     pub fn polygon(&mut self, vertices: impl Into<Vec<[f64; 2]>>) -> &mut Self {
-        self.outlines.push(vertices.into());
+        self.obstacles.push(vertices.into());
         self
     }
 
-    /// Adds a line without thickness, such as a kerb or a fence.
+    /// Adds a line without thickness, such as a fence: two or more vertices.
     pub fn polyline(&mut self, vertices: impl AsRef<[[f64; 2]]>) -> &mut Self {
-        self.outlines.extend(vertices.as_ref().windows(2).map(<[_]>::to_vec));
+        self.polylines.push(vertices.as_ref().to_vec());
         self
     }
 
     /// Adds points, as a range sensor sees them.
     pub fn points(&mut self, points: impl IntoIterator<Item = [f64; 2]>) -> &mut Self {
         self.points.extend(points);
+        self
+    }
+
+    /// Adds a solid that only wheels must keep off, such as a traffic island.
+    pub fn low_polygon(&mut self, vertices: impl Into<Vec<[f64; 2]>>) -> &mut Self {
+        self.low.obstacles.push(vertices.into());
+        self
+    }
+
+    /// Adds a line that only wheels must keep off, such as a kerb.
+    pub fn low_polyline(&mut self, vertices: impl Into<Vec<[f64; 2]>>) -> &mut Self {
+        self.low.polylines.push(vertices.into());
+        self
+    }
+
+    /// Adds points that only wheels must keep off.
+    pub fn low_points(&mut self, points: impl IntoIterator<Item = [f64; 2]>) -> &mut Self {
+        self.low.points.extend(points);
+        self
+    }
+
+    /// Keeps the body within a polygon and out of its holes.
+    pub fn drivable_area(&mut self, area: DrivableArea) -> &mut Self {
+        self.drivable_area = Some(area);
         self
     }
 
@@ -385,8 +430,15 @@ impl Lot {
             goals: if request.goals.len() > 1 { request.goals.clone() } else { Vec::new() },
             goal_tolerance: request.tolerance,
             parking_type: request.parking_type,
-            obstacles: self.outlines.clone(),
+            obstacles: self.obstacles.clone(),
+            polylines: self.polylines.clone(),
             points: self.points.clone(),
+            low: self.low.clone(),
+            drivable_area: self.drivable_area.clone(),
+            contour: request.contour.clone(),
+            margins: request.margins,
+            start_steer: request.start_steer,
+            previous: request.previous.clone(),
             bounds: self.bounds,
             ..Scene::default()
         }
@@ -447,6 +499,12 @@ impl Plan {
     pub fn poses(&self) -> PathFile {
         let ends = [self.start, self.goal];
         PathFile::between(ends, &self.vehicle, &self.frame, &self.driven(), self.method.name())
+    }
+
+    /// The same as a request takes it for the previous path.
+    pub fn previous(&self) -> PreviousPath {
+        let PathFile { poses, gears, steer, steer_from, steer_to, method } = self.poses();
+        PreviousPath { poses, gears, steer, steer_from, steer_to, method }
     }
 
     /// The path in time.

@@ -121,7 +121,7 @@ fn smooth_paths() -> impl Strategy<Value = (SmoothPath, Vehicle)> {
                 rear_overhang: v.rear_overhang * size,
                 ..v
             };
-            (SmoothPath { start, motions }, vehicle)
+            (SmoothPath { start, begin: 0.0, motions }, vehicle)
         },
     )
 }

@@ -52,7 +52,7 @@ fn paths() -> impl Strategy<Value = SmoothPath> {
     });
     let start = (-9.0..9.0, -9.0..9.0, -3.0..3.0).prop_map(|(x, y, h)| Pose::new(x, y, h));
     let paths = (start, prop::collection::vec(motion, 1..9));
-    paths.prop_map(|(start, motions)| SmoothPath { start, motions })
+    paths.prop_map(|(start, motions)| SmoothPath { start, begin: 0.0, motions })
 }
 
 /// The pose after `distance` metres of `path`.

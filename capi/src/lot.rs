@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use n3p::Lot;
+use n3p::world::DrivableArea;
 
 use super::handles::Table;
 use super::memory::{N3P_MAX_COUNT, Place, read_all};
@@ -106,7 +107,7 @@ pub unsafe extern "C" fn n3p_lot_polygon(
     })
 }
 
-/// Adds a line without thickness, such as a kerb or a fence; `xy` as in n3p_lot_polygon.
+/// Adds a line without thickness, such as a fence; `xy` as in n3p_lot_polygon.
 #[doc = safety!("`xy` leads to 2 `count` numbers, which nobody changes meanwhile.")]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn n3p_lot_polyline(
@@ -118,6 +119,52 @@ pub unsafe extern "C" fn n3p_lot_polyline(
         // SAFETY: what this function asks for.
         let vertices = unsafe { read_outline(xy, count) }?;
         change(lot, |lot| lot.polyline(vertices))
+    })
+}
+
+/// Adds a solid that only wheels must keep off, such as a traffic island; `xy` as in n3p_lot_polygon.
+#[doc = safety!("`xy` leads to 2 `count` numbers, which nobody changes meanwhile.")]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn n3p_lot_low_polygon(
+    lot: *mut n3p_lot,
+    xy: *const f64,
+    count: usize,
+) -> n3p_status {
+    guarded(|| {
+        // SAFETY: what this function asks for.
+        let vertices = unsafe { read_outline(xy, count) }?;
+        change(lot, |lot| lot.low_polygon(vertices))
+    })
+}
+
+/// Adds a line that only wheels must keep off, such as a kerb; `xy` as in n3p_lot_polygon.
+#[doc = safety!("`xy` leads to 2 `count` numbers, which nobody changes meanwhile.")]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn n3p_lot_low_polyline(
+    lot: *mut n3p_lot,
+    xy: *const f64,
+    count: usize,
+) -> n3p_status {
+    guarded(|| {
+        // SAFETY: what this function asks for.
+        let vertices = unsafe { read_outline(xy, count) }?;
+        change(lot, |lot| lot.low_polyline(vertices))
+    })
+}
+
+/// Keeps the car's body within a polygon, instead of one given before; `xy` as in n3p_lot_polygon. What is
+/// left out of it are polygons that stand there.
+#[doc = safety!("`xy` leads to 2 `count` numbers, which nobody changes meanwhile.")]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn n3p_lot_drivable_area(
+    lot: *mut n3p_lot,
+    xy: *const f64,
+    count: usize,
+) -> n3p_status {
+    guarded(|| {
+        // SAFETY: what this function asks for.
+        let outer = unsafe { read_outline(xy, count) }?.to_vec();
+        change(lot, |lot| lot.drivable_area(DrivableArea { outer, holes: Vec::new() }))
     })
 }
 

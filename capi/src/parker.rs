@@ -4,6 +4,7 @@ use std::iter::zip;
 use std::ptr;
 
 use n3p::geometry::Pose;
+use n3p::vehicle::Margins;
 use n3p::world::{GoalTolerance, Scene};
 use n3p::{Method, Models, Parker, Plan, PlanError, Request};
 
@@ -13,7 +14,7 @@ use super::memory::{N3P_MAX_COUNT, Place, read, read_all, read_or, read_text};
 use super::plan::{Kept, PLANS, n3p_plan};
 use super::scene::{SCENES, n3p_scene};
 use super::status::{Failure, Result, guarded, n3p_status};
-use super::types::{n3p_options, n3p_pose, n3p_request, n3p_vehicle, parking_type};
+use super::types::{n3p_margins, n3p_options, n3p_pose, n3p_request, n3p_vehicle, parking_type};
 
 /// Plans for one vehicle.
 pub enum n3p_parker {}
@@ -269,8 +270,8 @@ unsafe fn planned(
 
 /// # Safety
 ///
-/// Where they are neither NULL nor misaligned, the request's goals lead to as many poses as it says,
-/// which nobody changes meanwhile.
+/// Where they are neither NULL nor misaligned, the request's goals and contour lead to as many poses and
+/// vertices as it says, which nobody changes meanwhile.
 unsafe fn to_request(request: &n3p_request) -> Result<Request> {
     let count = request.goal_count;
     if !(1..=Scene::MAX_GOALS).contains(&count) {
@@ -280,11 +281,26 @@ unsafe fn to_request(request: &n3p_request) -> Result<Request> {
     // SAFETY: the caller's word.
     let goals = unsafe { read_all(request.goals, count, "goals") }?;
     let (position_m, heading_rad) = (request.position_tolerance, request.heading_tolerance);
+    // SAFETY: pairs of numbers are aligned as numbers are, and the caller's word.
+    let contour = match request.contour_count {
+        0 => &[],
+        count => unsafe { read_all(request.contour.cast::<[f64; 2]>(), count, "contour") }?,
+    };
+    let n3p_margins { front, rear, left, right } = request.margins;
+    let given = Margins { front, rear, left, right };
+    let previous = match request.previous.is_null() {
+        true => None,
+        false => Some(PLANS.get(request.previous, "previous")?),
+    };
     let exact = position_m == 0.0 && heading_rad == 0.0;
     Ok(Request {
         start: request.start.into(),
         goals: goals.iter().map(|&goal| Pose::from(goal)).collect(),
         tolerance: (!exact).then_some(GoalTolerance { position_m, heading_rad }),
         parking_type: parking_type(request.parking_type)?,
+        contour: contour.to_vec(),
+        margins: (given != Margins::default()).then_some(given),
+        start_steer: request.start_steer,
+        previous: previous.map(|kept| kept.plan.previous()),
     })
 }

@@ -9,6 +9,7 @@ use n3p::planners::{Budget, Effort};
 use n3p::world::ParkingType;
 use std::ffi::c_char;
 
+use super::plan::n3p_plan;
 use super::status::{Failure, Result};
 
 /// A pose of the centre of the rear axle.
@@ -230,6 +231,33 @@ pub struct n3p_request {
     pub heading_tolerance: f64,
     /// How the goal lies in its spot, an n3p_parking_type.
     pub parking_type: i32,
+    /// Distance to keep ahead of the car, behind it, and on either side, metres, 0 to 1; 0 for the
+    /// parker's own.
+    pub margins: n3p_margins,
+    /// The car's outline in its own frame, x and y of each vertex in turn, within the rectangle of its
+    /// sizes; NULL where it is that rectangle.
+    pub contour: *const f64,
+    /// How many vertices the outline has, 3 to 64; 0 for none.
+    pub contour_count: usize,
+    /// Angle of the front wheels at the start, radians, positive to the left.
+    pub start_steer: f64,
+    /// The plan that the car follows already, which is kept while it is free and near the best; NULL
+    /// for none.
+    pub previous: *const n3p_plan,
+}
+
+/// Distances on each side of a car, metres.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct n3p_margins {
+    /// Ahead of it.
+    pub front: f64,
+    /// Behind it.
+    pub rear: f64,
+    /// On its left.
+    pub left: f64,
+    /// On its right.
+    pub right: f64,
 }
 
 /// What a plan came to.
@@ -251,7 +279,7 @@ pub struct n3p_summary {
     pub parking_type: i32,
     /// The method's name.
     pub method: [c_char; 16],
-    /// How n3p came to it: "library", "direct", "searched", "fallback", "no-lane", "no-spot"; "" by
+    /// How n3p came to it: "library", "direct", "searched", "fallback", "no-lane", "no-spot", or "kept"; "" by
     /// other methods.
     pub route: [c_char; 16],
 }

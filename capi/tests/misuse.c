@@ -206,7 +206,27 @@ static void plans(void) {
     request.heading_tolerance = -0.1;
     BAD(n3p_parker_plan_request(parker, &request, lot, &plan), "heading_rad is -0.1");
     request.heading_tolerance = 0.02;
+    request.margins.left = 2.0;
+    BAD(n3p_parker_plan_request(parker, &request, lot, &plan), "margins.left is 2");
+    request.margins.left = 0.05;
+    request.start_steer = NAN;
+    BAD(n3p_parker_plan_request(parker, &request, lot, &plan), "start_steer is NaN");
+    request.start_steer = 0.1;
+    request.contour_count = 4;
+    BAD(n3p_parker_plan_request(parker, &request, lot, &plan), "contour is NULL");
+    const double wrong[] = {-1.1, -0.93, 3.87, -0.6, 3.87, 0.6, 9.0, 0.93};
+    request.contour = wrong;
+    BAD(n3p_parker_plan_request(parker, &request, lot, &plan), "contour[3]");
+    const double contour[] = {-1.1, -0.93, 3.87, -0.6, 3.87, 0.6, -1.1, 0.93};
+    request.contour = contour;
     OK(n3p_parker_plan_request(parker, &request, lot, &plan));
+    request.previous = plan;
+    n3p_plan *kept = NULL;
+    OK(n3p_parker_plan_request(parker, &request, lot, &kept));
+    OK(n3p_plan_free(kept));
+    request.previous = (const n3p_plan *)lot;
+    BAD(n3p_parker_plan_request(parker, &request, lot, &kept), "previous");
+    request.previous = NULL;
     OK(n3p_plan_free(plan));
 
     /* A polygon of no size, and one too far away to be told from others near it. */

@@ -67,6 +67,12 @@ class Scene:
         goals: ArrayLike | None = None,
         tolerance: tuple[float, float] | dict[str, float] | None = None,
         parking_type: ParkingType | None = None,
+        low: dict[str, Any] | None = None,
+        drivable_area: dict[str, Any] | None = None,
+        contour: ArrayLike | None = None,
+        margins: dict[str, float] | None = None,
+        start_steer: float = 0.0,
+        previous: Plan | dict[str, Any] | None = None,
         vehicle: VehicleLike | None = None,
         name: str = "",
     ) -> None: ...
@@ -113,6 +119,12 @@ class Request(TypedDict, total=False):
     goals: ArrayLike
     tolerance: tuple[float, float] | dict[str, float]
     parking_type: ParkingType
+    low: dict[str, Any]
+    drivable_area: dict[str, Any]
+    contour: ArrayLike
+    margins: dict[str, float]
+    start_steer: float
+    previous: Plan | dict[str, Any]
 
 class Parker:
     def __init__(
@@ -142,6 +154,12 @@ class Parker:
         goals: ArrayLike | None = None,
         tolerance: tuple[float, float] | dict[str, float] | None = None,
         parking_type: ParkingType | None = None,
+        low: dict[str, Any] | None = None,
+        drivable_area: dict[str, Any] | None = None,
+        contour: ArrayLike | None = None,
+        margins: dict[str, float] | None = None,
+        start_steer: float = 0.0,
+        previous: Plan | dict[str, Any] | None = None,
     ) -> Plan: ...
     def plan_scene(self, scene: SceneLike) -> Plan: ...
     def plan_batch(self, requests: Iterable[SceneLike | Request]) -> list[Plan | N3PError]: ...

@@ -9,7 +9,7 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyFloat, PyList, PyString, PyTuple, PyType};
 
 use n3p::curves::smoothing::StandstillSteering;
-use n3p::world::{GoalTolerance, ParkingType};
+use n3p::world::{GoalTolerance, LowObstacles, ParkingType, PreviousPath};
 use n3p::{Lot, Request};
 
 use crate::errors::Fault;
@@ -246,6 +246,8 @@ pub struct LotArguments<'a, 'py> {
     pub polylines: Option<&'a Bound<'py, PyAny>>,
     pub points: Option<&'a Bound<'py, PyAny>>,
     pub grid: Option<&'a Bound<'py, PyAny>>,
+    pub low: Option<&'a Bound<'py, PyAny>>,
+    pub drivable_area: Option<&'a Bound<'py, PyAny>>,
     pub bounds: Option<&'a Bound<'py, PyAny>>,
 }
 
@@ -273,6 +275,15 @@ impl LotArguments<'_, '_> {
         if let Some(grid) = self.grid {
             add_grid(&mut lot, grid).map_err(|w| w.of("grid"))?;
         }
+        if let Some(low) = self.low {
+            let LowObstacles { obstacles, polylines, points } = crate::json::read(low, "low")?;
+            obstacles.into_iter().for_each(|o| _ = lot.low_polygon(o));
+            polylines.into_iter().for_each(|p| _ = lot.low_polyline(p));
+            lot.low_points(points);
+        }
+        if let Some(area) = self.drivable_area {
+            lot.drivable_area(crate::json::read(area, "drivable_area")?);
+        }
         if let Some(bounds) = self.bounds {
             lot.bounds(numbers(bounds).map_err(|w| w.of("bounds"))?);
         }
@@ -287,6 +298,10 @@ pub struct RequestArguments<'a, 'py> {
     pub goals: Option<&'a Bound<'py, PyAny>>,
     pub tolerance: Option<&'a Bound<'py, PyAny>>,
     pub parking_type: Option<&'a Bound<'py, PyAny>>,
+    pub contour: Option<&'a Bound<'py, PyAny>>,
+    pub margins: Option<&'a Bound<'py, PyAny>>,
+    pub start_steer: f64,
+    pub previous: Option<&'a Bound<'py, PyAny>>,
 }
 
 impl RequestArguments<'_, '_> {
@@ -309,8 +324,23 @@ impl RequestArguments<'_, '_> {
                 .parking_type
                 .map(|t| text::<ParkingType>(t, "parking_type"))
                 .transpose()?,
+            contour: match self.contour {
+                Some(contour) => rows::<2>(contour).map_err(|w| w.of("contour"))?,
+                None => Vec::new(),
+            },
+            margins: self.margins.map(|m| crate::json::read(m, "margins")).transpose()?,
+            start_steer: self.start_steer,
+            previous: self.previous.map(previous).transpose()?,
         })
     }
+}
+
+/// A plan, or the arrays of a path file.
+fn previous(object: &Bound<'_, PyAny>) -> Result<PreviousPath, Fault> {
+    if let Ok(plan) = object.cast::<crate::plan::Plan>() {
+        return Ok(plan.borrow().previous());
+    }
+    crate::json::read(object, "previous")
 }
 
 fn tolerance(object: &Bound<'_, PyAny>) -> Result<GoalTolerance, Fault> {

@@ -3,6 +3,7 @@
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
+use serde::de::DeserializeOwned;
 use serde_json::{Map, Number, Value};
 
 use crate::errors::Fault;
@@ -18,6 +19,12 @@ pub fn value(object: &Bound<'_, PyAny>, name: &str) -> Result<Value, Fault> {
         let dot = if place.is_empty() || place.starts_with('[') { "" } else { "." };
         Fault::bad(format!("{name}{dot}{place}: {what}"))
     })
+}
+
+/// Something of ours that a dict or a list is.
+pub fn read<T: DeserializeOwned>(object: &Bound<'_, PyAny>, name: &str) -> Result<T, Fault> {
+    let value = value(object, name)?;
+    serde_json::from_value(value).map_err(|e| Fault::bad(format!("{name}: {e}")))
 }
 
 struct Unfit {

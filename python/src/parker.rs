@@ -153,7 +153,7 @@ impl Parker {
     ///
     /// Parameters
     /// ----------
-    /// start, goal, polygons, polylines, points, grid, bounds, goals, tolerance, parking_type
+    /// start, goal, polygons, polylines, points, grid, bounds, goals, tolerance, parking_type, low, drivable_area, contour, margins, start_steer, previous
     ///     As in `Scene`: metres and radians, in any frame that all share.
     ///
     /// Returns
@@ -166,7 +166,7 @@ impl Parker {
     ///     What is given makes no sense, or start or goal is not free.
     /// n3p.NoPath
     ///     There is no path, or none was found; its ``reason`` says which.
-    #[pyo3(signature = (start, goal=None, *, polygons=None, polylines=None, points=None, grid=None, bounds=None, goals=None, tolerance=None, parking_type=None))]
+    #[pyo3(signature = (start, goal=None, *, polygons=None, polylines=None, points=None, grid=None, bounds=None, goals=None, tolerance=None, parking_type=None, low=None, drivable_area=None, contour=None, margins=None, start_steer=0.0, previous=None))]
     #[expect(clippy::too_many_arguments, reason = "they have names in Python")]
     fn plan(
         &self,
@@ -181,9 +181,27 @@ impl Parker {
         goals: Option<&Bound<'_, PyAny>>,
         tolerance: Option<&Bound<'_, PyAny>>,
         parking_type: Option<&Bound<'_, PyAny>>,
+        low: Option<&Bound<'_, PyAny>>,
+        drivable_area: Option<&Bound<'_, PyAny>>,
+        contour: Option<&Bound<'_, PyAny>>,
+        margins: Option<&Bound<'_, PyAny>>,
+        start_steer: f64,
+        previous: Option<&Bound<'_, PyAny>>,
     ) -> Result<Plan, Fault> {
-        let lot = LotArguments { polygons, polylines, points, grid, bounds }.lot()?;
-        let request = RequestArguments { start, goal, goals, tolerance, parking_type }.request()?;
+        let lot = LotArguments { polygons, polylines, points, grid, low, drivable_area, bounds };
+        let lot = lot.lot()?;
+        let request = RequestArguments {
+            start,
+            goal,
+            goals,
+            tolerance,
+            parking_type,
+            contour,
+            margins,
+            start_steer,
+            previous,
+        };
+        let request = request.request()?;
         let plan = py.detach(|| guarded(|| self.0.plan_request(&request, &lot)))??;
         Ok(Plan::new(plan))
     }

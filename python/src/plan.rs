@@ -11,7 +11,7 @@ use pyo3::types::PyDict;
 use n3p::curves::trajectory::Moment;
 use n3p::curves::{Clothoid, Segment, TrajectoryLimits};
 use n3p::output::PathFile;
-use n3p::world::ParkingType;
+use n3p::world::{ParkingType, PreviousPath};
 
 use crate::errors::{Fault, guarded};
 use crate::json;
@@ -41,6 +41,11 @@ impl Plan {
             steer_ends: [PyOnceLock::new(), PyOnceLock::new()],
             segments: PyOnceLock::new(),
         }
+    }
+
+    /// The path for a request that is to keep to it.
+    pub fn previous(&self) -> PreviousPath {
+        self.plan.previous()
     }
 
     fn file(&self) -> &PathFile {

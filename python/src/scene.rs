@@ -36,7 +36,7 @@ use crate::{json, plan};
 /// polygons : iterable of array_like, shape (N, 2), optional
 ///     Solid simple polygons, closed implicitly; two vertices are a wall.
 /// polylines : iterable of array_like, shape (N, 2), optional
-///     Lines without thickness, such as kerbs.
+///     Lines without thickness, such as fences.
 /// points : array_like, shape (N, 2), optional
 ///     Points, as a range sensor sees them.
 /// grid : tuple (cells, resolution, origin), optional
@@ -50,6 +50,18 @@ use crate::{json, plan};
 ///     How far from a goal the car may stop: metres (up to 1), radians (up to 0.5).
 /// parking_type : {"forward", "reverse", "parallel", "angled"}, optional
 ///     How the goal lies in its spot, where that is known; it is found otherwise.
+/// low : dict, optional
+///     What only wheels must keep off, such as kerbs: ``obstacles``, ``polylines`` and ``points``.
+/// drivable_area : dict, optional
+///     The body stays within the polygon ``outer`` and out of the polygons ``holes``.
+/// contour : array_like, shape (N, 2), optional
+///     The car's outline in its own frame, within the rectangle of its sizes, where it is not all of that.
+/// margins : dict, optional
+///     Clearance on each side, ``front``, ``rear``, ``left`` and ``right``, metres, up to 1.
+/// start_steer : float
+///     Angle of the front wheels at the start, radians.
+/// previous : Plan or dict, optional
+///     The path that the car follows already: kept while it is free and near the best.
 /// vehicle : Vehicle or dict, optional
 ///     The car; the default one where it is left out.
 /// name : str, optional
@@ -233,7 +245,7 @@ pub fn seed_of(seed: i128) -> Result<u64, Fault> {
 #[pymethods]
 impl Scene {
     #[new]
-    #[pyo3(signature = (start, goal=None, *, polygons=None, polylines=None, points=None, grid=None, bounds=None, goals=None, tolerance=None, parking_type=None, vehicle=None, name=String::new()))]
+    #[pyo3(signature = (start, goal=None, *, polygons=None, polylines=None, points=None, grid=None, bounds=None, goals=None, tolerance=None, parking_type=None, low=None, drivable_area=None, contour=None, margins=None, start_steer=0.0, previous=None, vehicle=None, name=String::new()))]
     #[expect(clippy::too_many_arguments, reason = "they have names in Python")]
     fn new(
         start: &Bound<'_, PyAny>,
@@ -246,11 +258,29 @@ impl Scene {
         goals: Option<&Bound<'_, PyAny>>,
         tolerance: Option<&Bound<'_, PyAny>>,
         parking_type: Option<&Bound<'_, PyAny>>,
+        low: Option<&Bound<'_, PyAny>>,
+        drivable_area: Option<&Bound<'_, PyAny>>,
+        contour: Option<&Bound<'_, PyAny>>,
+        margins: Option<&Bound<'_, PyAny>>,
+        start_steer: f64,
+        previous: Option<&Bound<'_, PyAny>>,
         vehicle: Option<&Bound<'_, PyAny>>,
         name: String,
     ) -> Result<Self, Fault> {
-        let lot = LotArguments { polygons, polylines, points, grid, bounds }.lot()?;
-        let request = RequestArguments { start, goal, goals, tolerance, parking_type }.request()?;
+        let lot = LotArguments { polygons, polylines, points, grid, low, drivable_area, bounds };
+        let lot = lot.lot()?;
+        let request = RequestArguments {
+            start,
+            goal,
+            goals,
+            tolerance,
+            parking_type,
+            contour,
+            margins,
+            start_steer,
+            previous,
+        };
+        let request = request.request()?;
         let scene = lot.scene(self::vehicle(vehicle)?, &request);
         Ok(Self::new_from(checked(world::Scene { name, ..scene })?, None))
     }

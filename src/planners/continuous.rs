@@ -170,9 +170,17 @@ fn shaped(problem: &Problem, result: &PlanResult, terms: &Terms) -> Option<PlanR
 
 /// `path` fitted to the goal of `problem` and made as smooth as `terms` ask, if it is free then.
 pub(super) fn fitted(problem: &Problem, path: &Path, terms: &Terms) -> Option<PlanResult> {
-    let goal = Some(problem.goal);
-    let wanted = Wanted { standstill: terms.standstill, last_straight: 0.0, goal };
-    let driven = smoothed(problem, path, wanted)?;
+    let goals = match problem.tolerance {
+        Some((goal, tolerance)) => tolerance.poses(goal),
+        None => vec![problem.goal],
+    };
+    let ended = |goal: Option<Pose>| {
+        let standstill = terms.standstill;
+        smoothed(problem, path, Wanted { standstill, last_straight: 0.0, goal })
+    };
+    // As it is, where it ends within the tolerance.
+    let as_it_is = || problem.is_arrival(path.end()).then(|| ended(None)).flatten();
+    let driven = goals.into_iter().find_map(|goal| ended(Some(goal))).or_else(as_it_is)?;
     let result = PlanResult::certified(problem, driven.arcs.clone(), 0);
     result.outcome.is_ok().then(|| {
         let result = driven.in_place_of(result);

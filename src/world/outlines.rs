@@ -86,7 +86,10 @@ impl Outline<'_> {
 
     /// It alone as geometry, in the scene's frame.
     pub fn geometry(&self) -> Result<Obstacles, ObstacleError> {
-        geometry(std::iter::once(*self), |v| v)
+        match self.shape {
+            Shape::Point => geometry(std::iter::empty(), self.vertices, |v| v),
+            _ => geometry(std::iter::once(*self), &[], |v| v),
+        }
     }
 
     /// Its edges: the last vertex leads to the first where it is closed, and to itself elsewhere, so that every vertex
@@ -143,6 +146,11 @@ impl Scene {
 
     /// [`Scene::outlines`] without what is low.
     pub fn high_outlines(&self) -> impl Iterator<Item = Outline<'_>> {
+        self.solid_outlines().chain(listed(&[], &[], &self.points, false))
+    }
+
+    /// [`Scene::high_outlines`] without points, of which there may be millions.
+    pub(super) fn solid_outlines(&self) -> impl Iterator<Item = Outline<'_>> {
         let area = self.drivable_area.iter().flat_map(|area| {
             let part = |list, index, shape, vertices| Outline {
                 list,
@@ -157,13 +165,7 @@ impl Scene {
             });
             std::iter::once(border).chain(holes)
         });
-        let (solid, points): (&[_], &[_]) = (&self.obstacles, &self.points);
-        listed(solid, &self.polylines, &[], false).chain(area).chain(listed(
-            &[],
-            &[],
-            points,
-            false,
-        ))
+        listed(&self.obstacles, &self.polylines, &[], false).chain(area)
     }
 
     /// Whether the middle of the car at `pose` lies within the drivable area, if there is one.
@@ -179,13 +181,22 @@ impl Scene {
 
     /// [`Scene::geometry`] with every point mapped by `map`.
     pub fn geometry_by(&self, map: impl Fn(Vec2) -> Vec2) -> Result<Obstacles, ObstacleError> {
-        geometry(self.high_outlines(), map)
+        geometry(self.solid_outlines(), &self.points, map)
     }
 
     /// What stands in the way of wheels alone, every point mapped by `map`.
     pub fn low_geometry_by(&self, map: impl Fn(Vec2) -> Vec2) -> Result<Obstacles, ObstacleError> {
         let LowObstacles { obstacles, polylines, points } = &self.low;
-        geometry(listed(obstacles, polylines, points, true), map)
+        geometry(listed(obstacles, polylines, &[], true), points, map)
+    }
+
+    /// Whether nothing is wrong with any of the points.
+    fn points_are_fit(&self) -> bool {
+        let fits = |v: f64, start: f64| {
+            v.abs() <= Self::MAX_COORDINATE && (v - start).abs() <= Self::MAX_REACH
+        };
+        let Pose { x, y, .. } = self.start;
+        self.points.iter().all(|p| fits(p[0], x) & fits(p[1], y))
     }
 
     /// Checks that every outline has enough vertices and `numbers` of each.
@@ -193,7 +204,12 @@ impl Scene {
         &self,
         numbers: impl Fn(&dyn Fn() -> String, &[f64]) -> Result<(), InvalidField>,
     ) -> Result<(), InvalidField> {
-        for outline in self.outlines() {
+        // One by one only where one of them is wrong.
+        let wrong: &[_] = if self.points_are_fit() { &[] } else { &self.points };
+        let wrong_points = listed(&[], &[], wrong, false);
+        let LowObstacles { obstacles, polylines, points } = &self.low;
+        let low = listed(obstacles, polylines, points, true);
+        for outline in self.solid_outlines().chain(wrong_points).chain(low) {
             for (j, vertex) in outline.vertices.iter().enumerate() {
                 let field = || match outline.shape {
                     Shape::Point => outline.to_string(),
@@ -225,16 +241,14 @@ impl Scene {
 
 fn geometry<'a>(
     outlines: impl Iterator<Item = Outline<'a>>,
+    points: &[[f64; 2]],
     map: impl Fn(Vec2) -> Vec2,
 ) -> Result<Obstacles, ObstacleError> {
-    let (mut polygons, mut walls, mut points) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut polygons, mut walls) = (Vec::new(), Vec::new());
     for outline in outlines {
         let mut vertices = outline.points().map(&map);
         let added = match outline.shape {
-            Shape::Point => {
-                points.extend(vertices);
-                continue;
-            }
+            Shape::Point => continue,
             Shape::Solid => Polygon::new(vertices.collect()).map(|polygon| polygons.push(polygon)),
             Shape::Chain => Polyline::new(vertices.collect()).map(|wall| walls.push(wall)),
             Shape::Border => {
@@ -248,5 +262,6 @@ fn geometry<'a>(
             ObstacleError::Shape { kind, index: outline.index.unwrap_or(0), fault }
         })?;
     }
-    Obstacles::new(polygons, walls, points)
+    let points = points.iter().map(|&[x, y]| map(Vec2::new(x, y)));
+    Obstacles::new(polygons, walls, points.collect())
 }

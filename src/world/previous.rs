@@ -104,6 +104,7 @@ impl PreviousPath {
         let mut i = first;
         while i + 1 < self.poses.len() {
             let [begin, _] = self.curvatures(i, vehicle);
+            let i_begins = i;
             let (gear, mut length, mut turn, mut end) = (self.gears[i], 0.0, 0.0, begin);
             // One motion: up to where the gear or the sense of steering changes, or the wheels are straight.
             while i + 1 < self.poses.len() {
@@ -129,7 +130,12 @@ impl PreviousPath {
             let turning = if peak == 0.0 { 0.0 } else { (turn / peak).clamp(0.0, length) };
             let parts = [(peak, turning), (0.0, length - turning)];
             let parts = if begin.abs() > end.abs() { parts } else { [parts[1], parts[0]] };
-            parts.into_iter().for_each(|(curvature, length)| add(curvature, length, gear));
+            for (curvature, length) in parts {
+                // Wheels that are turned already need no straight to turn on.
+                if curvature != 0.0 || peak == 0.0 || i_begins > first || begin == 0.0 {
+                    add(curvature, length, gear);
+                }
+            }
         }
         Some(rest)
     }
@@ -137,6 +143,8 @@ impl PreviousPath {
     /// The curvatures at both ends of the motion that follows pose `i`, 1/m.
     fn curvatures(&self, i: usize, vehicle: &Vehicle) -> [f64; 2] {
         let angle = |list: &Option<Vec<f64>>| list.as_ref().map_or(self.steer[i], |s| s[i]);
-        [&self.steer_from, &self.steer_to].map(|s| vehicle.curvature(angle(s)))
+        // What is straight but for rounding is straight.
+        let straightened = |curvature: f64| if curvature.abs() < 1e-9 { 0.0 } else { curvature };
+        [&self.steer_from, &self.steer_to].map(|s| straightened(vehicle.curvature(angle(s))))
     }
 }

@@ -211,7 +211,8 @@ fn wrong_lists(object: &Value, prefix: &str, names: &[&str]) -> Option<(String, 
         let field = prefix.trim_end_matches('.').to_owned();
         let expected = names.join(", ");
         let message = format!("is {}; expected an object of {expected}", brief(object));
-        return (!object.is_null()).then_some((field, message));
+        let is_told = !object.is_null() && !prefix.is_empty();
+        return is_told.then_some((field, message));
     }
     names.iter().find_map(|&name| {
         let (field, list) = (format!("{prefix}{name}"), object.get(name)?);

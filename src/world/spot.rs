@@ -19,7 +19,7 @@
 
 use super::abstraction::{Abstraction, Surroundings, abstractions};
 use super::cell::{Axis, Grid};
-use super::{ObstacleError, Obstacles, ParkingType, Scene, Shape, Stance};
+use super::{ObstacleError, Obstacles, ParkingType, Scene, Stance};
 use crate::geometry::{Aabb, Frame, Pose, Vec2, segment_in_box};
 
 mod angled;
@@ -296,11 +296,11 @@ fn around_goal(scene: &Scene, precision: Precision) -> Surroundings {
     let is_near = |points: &[[f64; 2]]| Aabb::around(points.iter().map(point)).intersects(&reach);
     let seen = |p: Vec2| precision.point(view(p));
     let mut near = Surroundings::default();
-    for outline in scene.high_outlines().filter(|o| is_near(o.vertices)) {
-        match outline.shape {
-            Shape::Point => outline.points().for_each(|p| near.add_point(seen(p))),
-            _ => near.add_polygon(outline.edges().map(|(a, b)| (seen(a), seen(b)))),
-        }
+    for outline in scene.solid_outlines().filter(|o| is_near(o.vertices)) {
+        near.add_polygon(outline.edges().map(|(a, b)| (seen(a), seen(b))));
+    }
+    for p in scene.points.iter().map(point).filter(|&p| reach.contains(p)) {
+        near.add_point(seen(p));
     }
     near
 }

@@ -108,9 +108,11 @@ pub fn smooth(path: &Path, goal: Pose, smoothing: &Smoothing) -> Option<SmoothPa
 
 /// The curvature with which the first turn begins, where that is to the side to which the wheels stand already.
 fn begun(first: Segment, smoothing: &Smoothing) -> f64 {
-    let begin = smoothing.begin;
-    let goes_on = begin * first.curvature > 0.0 && begin.abs() <= first.curvature.abs();
-    if goes_on { begin.abs() } else { 0.0 }
+    /// Angles that were curvatures once differ by rounding.
+    const ROUNDING: f64 = 1e-9;
+    let (begin, most) = (smoothing.begin, first.curvature.abs());
+    let goes_on = begin * first.curvature > 0.0 && begin.abs() <= most * (1.0 + ROUNDING);
+    if goes_on { begin.abs().min(most) } else { 0.0 }
 }
 
 /// The clothoid on which the wheels become straight at the start, where they may not turn before; of no length else.

@@ -81,6 +81,8 @@ impl Contour {
     }
 
     /// Whether it meets the segment `a`–`b` while it drives `segment`; it must be free of it at the start.
+    ///
+    /// Of the two ends only `a` is tested as a corner of its own, as in [`Sweep::hits`](super::Sweep::hits).
     pub fn sweeps(&self, segment: Segment, a: Vec2, b: Vec2) -> bool {
         let turn = segment.turn();
         if turn.abs() < super::sweep::STRAIGHT_TURN {

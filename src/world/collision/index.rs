@@ -127,10 +127,30 @@ fn along_a_curve<T: Copy>(all: &mut [T], place: impl Fn(&T) -> Vec2) {
         let p = place(one) - extent.min;
         spread(p.x) | spread(p.y) << 1
     };
-    let mut keyed: Vec<(u32, T)> = all.iter().map(|one| (key(one), *one)).collect();
-    // Stable, so that the order is that of the scene among equals.
-    keyed.sort_by_key(|(key, _)| *key);
-    all.iter_mut().zip(keyed).for_each(|(slot, (_, one))| *slot = one);
+    let keyed = by_key(all.iter().map(key).zip(0..).collect());
+    let sorted: Vec<T> = keyed.into_iter().map(|(_, i)| all[i as usize]).collect();
+    all.copy_from_slice(&sorted);
+}
+
+/// Numbers in the order of their keys, those with equal keys as they were: half a key at a time, the low half first.
+fn by_key(mut keyed: Vec<(u32, u32)>) -> Vec<(u32, u32)> {
+    let mut other = vec![(0, 0); keyed.len()];
+    for shift in [0, 16] {
+        let half = |key: u32| (key >> shift) as usize & 0xffff;
+        let mut places = vec![0_u32; 1 << 16];
+        keyed.iter().for_each(|&(key, _)| places[half(key)] += 1);
+        let mut before = 0;
+        for place in &mut places {
+            (*place, before) = (before, before + *place);
+        }
+        for &one in &keyed {
+            let place = &mut places[half(one.0)];
+            other[*place as usize] = one;
+            *place += 1;
+        }
+        std::mem::swap(&mut keyed, &mut other);
+    }
+    keyed
 }
 
 impl EdgeIndex {
@@ -171,7 +191,14 @@ impl EdgeIndex {
                 stripes.then(a.y.total_cmp(&b.y)).then(a.x.total_cmp(&b.x))
             });
         }
-        add(&mut points.iter().map(|&p| (p, p)));
+        let first = edges.len();
+        edges.extend(points.iter().map(|&p| (p, p)));
+        for (i, together) in points.chunks(CLUSTER).enumerate() {
+            let first = first + i * CLUSTER;
+            let aabb = Aabb::around(together.iter().copied());
+            clusters
+                .push(Cluster { aabb, edges: [first, first + together.len()].map(|i| i as u32) });
+        }
         Self { clusters: Clusters::new(clusters), polygons: Clusters::new(polygons), edges }
     }
 
