@@ -19,6 +19,9 @@ const chosen = () => ({
   steering: $("steering").value,
 });
 
+/** What was wrong with a file or a link; said until something is changed. */
+let notice = null;
+
 function say(text, isError = true) {
   $("message").hidden = !text;
   $("message").textContent = text ?? "";
@@ -61,7 +64,7 @@ function show({ plans, error }, asked) {
     return;
   }
   const reason = plans[0].no_path;
-  say(reason && `No path by ${titleOf(plans[0].method)}: ${REASONS[reason] ?? reason}.`);
+  say(reason ? `No path by ${titleOf(plans[0].method)}: ${REASONS[reason] ?? reason}.` : notice);
   picture.show(plans, null);
   numbers(plans);
   tour.take(plans[0]);
@@ -127,11 +130,16 @@ function legend() {
   }));
 }
 
-function chose() {
+function chosenWords() {
   const { margin } = chosen();
   $("margin-shown").textContent = margin < 0.01 ? "½ cm" : `${Math.round(margin * 100)} cm`;
   $("method-words").textContent = catalogue.methods.find((m) => m.name === $("method").value)?.words ?? "";
   legend();
+}
+
+function chose() {
+  notice = null;
+  chosenWords();
   follow();
 }
 
@@ -141,8 +149,9 @@ function options(select, entries) {
 
 /** Puts a scene on the page. */
 function put(scene, name = "") {
-  edit.select(null);
+  notice = null;
   lot.replace(scene);
+  edit.select(null);
   showVehicle();
   $("example").value = name;
   picture.show([], null);
@@ -151,8 +160,12 @@ function put(scene, name = "") {
   follow();
 }
 
+let shownVehicle = null;
+
 function showVehicle() {
   const { vehicle } = lot.scene;
+  if (vehicle === shownVehicle) return;
+  shownVehicle = vehicle;
   const sizes = (v) => [v.length, v.width, v.wheelbase, v.rear_overhang, v.max_steer].map((n) => n.toFixed(3)).join();
   let at = vehicles.findIndex((v) => sizes(v.vehicle) === sizes(vehicle));
   if (at < 0) {
@@ -167,7 +180,7 @@ async function load(file) {
   try {
     put(await files.read(file.name, new Uint8Array(await file.arrayBuffer())));
   } catch (e) {
-    say(e.message);
+    say(notice = e.message);
   }
 }
 
@@ -183,7 +196,7 @@ async function showLink() {
     chose();
     return true;
   } catch (e) {
-    say(e.message);
+    say(notice = e.message);
     return false;
   }
 }
@@ -246,6 +259,7 @@ function listen() {
   window.addEventListener("hashchange", showLink);
   document.addEventListener("keydown", keys);
   edit.whenChanged(() => {
+    notice = null;
     showVehicle();
     picture.drawScene();
     follow();
@@ -296,11 +310,11 @@ async function begin() {
   $("margin").value = 0.1;
   listen();
   say(null);
+  chosenWords();
   if (!await showLink()) {
-    const told = $("message").textContent;
+    const told = notice;
     put(catalogue.examples[0].scene, "0");
-    chose();
-    if (told) say(told);
+    notice = told;
   }
   $("about").textContent = `N3P ${catalogue.version}, planned ${planner.where}. Times are of this machine, one thread.`;
   setInterval(tell, 500);

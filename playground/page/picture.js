@@ -61,11 +61,13 @@ const picture = (() => {
     const reach = scene.vehicle.length * 0.75;
     const seen = [scene.start, ...goalsOf(scene), ...plans.flatMap((plan) => plan.path?.poses ?? [])];
     const box = boxAround(seen);
-    const [w, h] = size();
-    view.x = (box[0] + box[2]) / 2;
-    view.y = (box[1] + box[3]) / 2;
+    // Below the tools and above the legend.
+    const [top, bottom] = [document.getElementById("tools").offsetHeight + 14, 34];
+    const [w, h] = [size()[0], size()[1] - top - bottom];
     view.scale = Math.min(60 * 5 / scene.vehicle.length,
       w / (box[2] - box[0] + 2 * reach), h / (box[3] - box[1] + 2 * reach));
+    view.x = (box[0] + box[2]) / 2;
+    view.y = (box[1] + box[3]) / 2 + (top - bottom) / 2 / view.scale;
     look();
   }
 
@@ -74,10 +76,10 @@ const picture = (() => {
     const { length, width, wheelbase, rear_overhang: back } = vehicle;
     parent.replaceChildren();
     parent.setAttribute("class", `car ${kind}`);
-    const wheel = { width: length * 0.13, height: width * 0.12, class: "wheel" };
+    const wheel = { width: length * 0.13, height: width * 0.14, class: "wheel" };
     for (const side of [-1, 1]) {
       for (const [axle, steered] of [[0, false], [wheelbase, true]]) {
-        const at = element("g", { transform: `translate(${axle} ${side * width * 0.41})` }, parent);
+        const at = element("g", { transform: `translate(${axle} ${side * width * 0.45})` }, parent);
         const turning = element("g", steered ? { class: "steered" } : {}, at);
         element("rect", { ...wheel, x: -wheel.width / 2, y: -wheel.height / 2 }, turning);
       }
@@ -86,7 +88,7 @@ const picture = (() => {
     const [a, b] = [length * 0.62 - back, length * 0.74 - back];
     element("polygon", { class: "glass", points: text([[a, -width * 0.36], [b, -width * 0.42], [b, width * 0.42], [a, width * 0.36]]) }, parent);
     if (name) {
-      const label = element("text", { class: "name", transform: `translate(${length * 0.3 - back} 0) scale(1 -1)`, "font-size": width * 0.4 }, parent);
+      const label = element("text", { class: "name", "font-size": Math.min(width * 0.36, length * 0.16) }, parent);
       label.textContent = name;
     }
   }
@@ -100,8 +102,9 @@ const picture = (() => {
     group.setAttribute("transform", transform(pose));
     // Names are read from the left.
     const label = group.querySelector(".name");
-    const upsideDown = Math.cos(pose[2]) < -0.01;
-    if (label) label.style.rotate = upsideDown ? "180deg" : "";
+    const { length, rear_overhang: back } = vehicle;
+    const turn = Math.cos(pose[2]) < -0.01 ? " rotate(180)" : "";
+    label?.setAttribute("transform", `translate(${length * 0.31 - back} 0) scale(1 -1)${turn}`);
   }
 
   /** As many children of a layer as there are things, each focusable. */
@@ -170,7 +173,7 @@ const picture = (() => {
     }
   }
 
-  /** Footprints along a path, some way apart. */
+  /** What a car covers on a path: its footprints, all turning the same way, so that they fill as one. */
   function drawSwept(path, vehicle) {
     const group = layer("swept");
     group.replaceChildren();
@@ -178,7 +181,7 @@ const picture = (() => {
     let d = "";
     let last = null;
     for (const pose of path.poses) {
-      if (last && distance(pose, last) + Math.abs(pose[2] - last[2]) * vehicle.length / 2 < vehicle.length * 0.12) continue;
+      if (last && distance(pose, last) + Math.abs(pose[2] - last[2]) * vehicle.length / 2 < vehicle.length * 0.06) continue;
       last = pose;
       d += `M${text(footprint(vehicle, pose)).replaceAll(" ", "L")}Z`;
     }

@@ -67,6 +67,9 @@ class Follower {
     this.#shows = shows;
   }
 
+  /** Whether an answer is still to come. */
+  get busy() { return this.#running; }
+
   async follow() {
     this.#wanted = true;
     if (this.#running) return;

@@ -22,26 +22,28 @@ const tour = (() => {
         + "The usual planner, Hybrid A*, searches through thousands of small moves. N3P remembers instead. Drag anything while you read.",
     },
     {
-      title: "1. See only what matters",
+      title: "See only what matters",
       show() {
         const spot = plan?.spot;
         if (!spot?.lane_and_spot) return "Here nothing looks like a spot beside a free lane, so N3P plans by search. Try one of the examples.";
-        return `Thousands of corners become three numbers: how wide the lane is (yellow, ${m(spot.lane_width_m)}), how wide the spot is `
+        const { obstacles, points } = lot.scene;
+        const corners = obstacles.flat().length + (points?.length ?? 0);
+        return `${corners} corners and points become three numbers: how wide the lane is (yellow, ${m(spot.lane_width_m)}), how wide the spot is `
           + `(green, ${spot.spot_width_m === null ? "open" : m(spot.spot_width_m)}), and how far the lane goes on past it (${m(spot.dead_end_m)}). `
           + "Rounded down they name a cell. Both rectangles are free of obstacles, so whatever fits into the cell fits here.";
       },
     },
     {
-      title: "2. Where to begin",
+      title: "Know where to begin",
       show() {
         if (!plan?.spot?.preparatory) return "For this scene N3P needs no preparatory pose: a curve leads straight to the goal, or a search was better.";
         return "For each cell N3P learned, offline, where to stand before the car parks: the preparatory pose (violet). "
           + "From there a known manoeuvre leads into the spot. What is left is easy: to drive to that pose.";
       },
     },
-    { title: "3. Try what is known", show: tryAll },
+    { title: "Try what is known", show: tryAll },
     {
-      title: "4. The path",
+      title: "The path",
       show() {
         if (!plan?.path) return "There is no path here. Move something.";
         return `${plan.spot?.explanation ?? "a search"}: ${m(plan.length_m)} in ${duration(plan.plan_us)}. `

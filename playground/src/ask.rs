@@ -144,9 +144,8 @@ pub fn answer(request: &str) -> String {
 }
 
 fn respond(request: &str, desk: &mut Desk) -> Result<Value, Failure> {
-    let wrong = |e: serde_json::Error| {
-        Failure::of(Some("request"), format!("the request is none: {e}"))
-    };
+    let wrong =
+        |e: serde_json::Error| Failure::of(Some("request"), format!("the request is none: {e}"));
     match serde_json::from_str(request).map_err(wrong)? {
         Request::Catalogue {} => Ok(catalogue()),
         Request::Load(file) => Ok(json!({ "scene": load(&file)? })),

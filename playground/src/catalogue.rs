@@ -7,11 +7,19 @@ use serde_json::{Value, json};
 const METHODS: [(Method, &str, &str); 7] = [
     (Method::N3P, "N3P", "known manoeuvres first, a search only where none fits"),
     (Method::KNN_N3P, "N3P of the paper", "one learned preparatory pose, then two short searches"),
-    (Method::HA_RS, "Hybrid A* with Reeds-Shepp", "a search that tries curves to the goal on its way"),
+    (
+        Method::HA_RS,
+        "Hybrid A* + curves",
+        "a search that tries Reeds-Shepp curves to the goal on its way",
+    ),
     (Method::HA, "Hybrid A*", "a plain search"),
-    (Method::HA_HOLD, "Hybrid A*, best of five", "a search that compares its first five solutions"),
-    (Method::MHHA, "Multi-heuristic A*", "a search with several estimates of what is left to drive"),
-    (Method::SHA, "Exit manoeuvre and search", "for parallel spots: a search to where the way out ends"),
+    (Method::HA_HOLD, "Hybrid A*, best of 5", "a search that compares its first five solutions"),
+    (
+        Method::MHHA,
+        "Multi-heuristic A*",
+        "a search with several estimates of what is left to drive",
+    ),
+    (Method::SHA, "Exit first", "for parallel spots: a search to where the way out ends"),
 ];
 
 /// Length, width, wheelbase, rear overhang, metres; steering limit, radians.
@@ -39,9 +47,7 @@ const EXAMPLES: [(&str, &str); 10] = [
 
 /// Methods, vehicles and examples.
 pub fn catalogue() -> Value {
-    let method = |(method, title, words): &(Method, &str, &str)| {
-        json!({ "name": method.name(), "title": title, "words": words })
-    };
+    let method = |(method, title, words): &(Method, &str, &str)| json!({ "name": method.name(), "title": title, "words": words });
     let usual = [("Car", Vehicle::default())];
     let others = VEHICLES.map(|(name, [length, width, wheelbase, rear_overhang, max_steer])| {
         let sizes = Vehicle { length, width, wheelbase, rear_overhang, ..Vehicle::default() };

@@ -38,7 +38,8 @@ impl Desk {
             let models = self.models(vehicle)?;
             let built = method.build(models, &MethodSettings::default());
             let lacks_model = |_| {
-                let message = format!("{method} has no model for this vehicle; take n3p or a search");
+                let message =
+                    format!("{method} has no model for this vehicle; take n3p or a search");
                 Failure::of(Some("method"), message)
             };
             put(&mut self.planners, PLANNERS, (*vehicle, method, built.map_err(lacks_model)?));

@@ -81,7 +81,9 @@ fn parse(mut words: impl Iterator<Item = String>) -> Result<Option<Arguments>, S
                 let is_none = |_| format!("--port is {port:?}; expected a number from 0 to 65535");
                 arguments.port = port.parse().map_err(is_none)?;
             }
-            other => return Err(format!("unknown argument {other:?}; expected --port N or --open")),
+            other => {
+                return Err(format!("unknown argument {other:?}; expected --port N or --open"));
+            }
         }
     }
     Ok(Some(arguments))

@@ -172,7 +172,10 @@ impl House {
         let own = ["127.0.0.1", "localhost"].map(|host| format!("{host}:{}", self.port));
         let is_own = |host: &str| own.iter().any(|known| known == host);
         if !text(header::HOST).is_some_and(is_own) {
-            return Some(plain(StatusCode::MISDIRECTED_REQUEST, "this server is for 127.0.0.1 alone\n"));
+            return Some(plain(
+                StatusCode::MISDIRECTED_REQUEST,
+                "this server is for 127.0.0.1 alone\n",
+            ));
         }
         let is_ours = |origin: &str| origin.strip_prefix("http://").is_some_and(is_own);
         if text(header::ORIGIN).is_some_and(|origin| !is_ours(origin)) {

@@ -42,7 +42,9 @@ fn every_example_is_planned_and_tells_all_that_the_page_shows() {
             assert!(apart(0, &scene["start"]) < 1e-3, "{title}");
             assert!(apart(poses.len() - 1, &scene["goal"]) < 1e-3, "{title}");
             assert_eq!(plan["path"]["gears"].as_array().unwrap().len(), poses.len());
-            assert!(plan["plan_us"].as_f64().unwrap() > 0.0 && plan["length_m"].as_f64().unwrap() > 1.0);
+            assert!(
+                plan["plan_us"].as_f64().unwrap() > 0.0 && plan["length_m"].as_f64().unwrap() > 1.0
+            );
             let motion = &plan["motion"];
             let last = motion["time"].as_array().unwrap().last().unwrap().as_f64().unwrap();
             assert!((last - motion["duration_s"].as_f64().unwrap()).abs() < 0.02, "{title}");
@@ -64,7 +66,11 @@ fn every_example_is_planned_and_tells_all_that_the_page_shows() {
 
 /// A pose as answers have it.
 fn rounded(pose: &Value) -> Value {
-    pose.as_array().unwrap().iter().map(|v| json!((v.as_f64().unwrap() * 1e4).round() / 1e4)).collect()
+    pose.as_array()
+        .unwrap()
+        .iter()
+        .map(|v| json!((v.as_f64().unwrap() * 1e4).round() / 1e4))
+        .collect()
 }
 
 #[test]
@@ -89,7 +95,9 @@ fn continuous_steering_and_margins_are_kept() {
     let plan = &plan(scene, &["n3p"], wish)["plans"][0];
     assert!(plan["way_clearance_m"].as_f64().unwrap() > 0.2, "{plan}");
     // Wheels turn where the gear changes and at the start, and nowhere else.
-    assert!(plan["motion"]["stops"].as_u64() <= Some(plan["direction_changes"].as_u64().unwrap() + 1));
+    assert!(
+        plan["motion"]["stops"].as_u64() <= Some(plan["direction_changes"].as_u64().unwrap() + 1)
+    );
     let told = plan["path"]["poses"].as_array().unwrap().len();
     assert!(told > 100, "{told}");
 }
@@ -124,11 +132,17 @@ fn what_is_wrong_is_said_in_plain_words() {
     let answer = with("goal", json!([corner[0], corner[1], 0.0]));
     assert_eq!(answer["error"]["field"], "goal");
     let answer = with("goal", json!([1e6, 0.0, 0.0]));
-    assert!(message(&answer).contains("expected at most") || message(&answer).contains("plans up to"), "{answer}");
+    assert!(
+        message(&answer).contains("expected at most") || message(&answer).contains("plans up to"),
+        "{answer}"
+    );
     let answer = with("goal", json!([1500.0, 0.0, 0.0]));
     assert!(message(&answer).contains("plans up to"), "{answer}");
     let answer = with("vehicle", json!({ "length": 1 }));
-    assert!(message(&answer).contains("wheelbase") || message(&answer).contains("width"), "{answer}");
+    assert!(
+        message(&answer).contains("wheelbase") || message(&answer).contains("width"),
+        "{answer}"
+    );
     assert!(message(&with("start", json!(["a", 1]))).contains("start"));
     assert!(message(&with("colour", json!("red"))).contains("colour"));
     let answer = plan(&scene, &["n3p"], json!({ "margin": -1.0 }));
@@ -155,8 +169,18 @@ fn what_is_wrong_is_said_in_plain_words() {
 fn what_is_no_request_is_an_answer_too() {
     let deep = "[".repeat(200_000);
     for request in [
-        "", "{", "null", "[]", "\"plan\"", "{\"plan\":{}}", "{\"fly\":{}}", "{\"plan\":{\"scene\":1,\"methods\":[\"n3p\"]}}",
-        "{\"load\":{\"name\":\"a.json\",\"bytes\":\"*\"}}", "{\"catalogue\":{\"x\":1}}", "\u{0}", &deep,
+        "",
+        "{",
+        "null",
+        "[]",
+        "\"plan\"",
+        "{\"plan\":{}}",
+        "{\"fly\":{}}",
+        "{\"plan\":{\"scene\":1,\"methods\":[\"n3p\"]}}",
+        "{\"load\":{\"name\":\"a.json\",\"bytes\":\"*\"}}",
+        "{\"catalogue\":{\"x\":1}}",
+        "\u{0}",
+        &deep,
         "{\"plan\":{\"scene\":{\"vehicle\":null,\"start\":[NaN,0,0]},\"methods\":[\"n3p\"]}}",
     ] {
         let told: Value = serde_json::from_str(&answer(request)).unwrap();
@@ -174,9 +198,13 @@ fn numbers_without_sense_end_in_words() {
             let at = text.find(&format!("\"{key}\":[")).unwrap() + key.len() + 4;
             let end = at + text[at..].find(',').unwrap();
             text.replace_range(at..end, value);
-            let request = format!("{{\"plan\":{{\"scene\":{text},\"methods\":[\"n3p\",\"ha-rs\"]}}}}");
+            let request =
+                format!("{{\"plan\":{{\"scene\":{text},\"methods\":[\"n3p\",\"ha-rs\"]}}}}");
             let told: Value = serde_json::from_str(&answer(&request)).unwrap();
-            assert!(told["error"]["message"].is_string() || told["plans"].is_array(), "{value}: {told}");
+            assert!(
+                told["error"]["message"].is_string() || told["plans"].is_array(),
+                "{value}: {told}"
+            );
         }
     }
     // Many corners are refused before they cost anything.

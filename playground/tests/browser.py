@@ -41,10 +41,8 @@ class Tries:
 
     def settle(self):
         """Until the page has planned what is on it."""
-        before = self.browser.run("rate.total")
         self.browser.run("follower.follow(), 0")
-        self.browser.wait(f"rate.total > {before}")
-        self.browser.wait("!document.getElementById('message').textContent.startsWith('Getting')")
+        self.browser.wait("!follower.busy")
 
     def where(self, expression: str):
         """Where a point of the world is in the window."""

@@ -98,7 +98,7 @@ class Chromium:
     def open(self, address: str):
         self.call("Page.navigate", url="about:blank")
         self.call("Page.navigate", url=address)
-        self.wait("document.documentElement.dataset.ready !== undefined", 60)
+        self.wait("document.documentElement?.dataset.ready !== undefined", 60)
 
     def size(self, width: int, height: int, touch: bool = False):
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=touch)

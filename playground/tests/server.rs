@@ -42,12 +42,18 @@ fn send(server: SocketAddr, request: &[u8]) -> String {
 }
 
 fn status(answer: &str) -> u16 {
-    answer.split(' ').nth(1).and_then(|code| code.parse().ok()).unwrap_or_else(|| panic!("{answer:?}"))
+    answer
+        .split(' ')
+        .nth(1)
+        .and_then(|code| code.parse().ok())
+        .unwrap_or_else(|| panic!("{answer:?}"))
 }
 
 fn with_headers(server: SocketAddr, line: &str, headers: &str, body: &str) -> String {
     let length = body.len();
-    let request = format!("{line} HTTP/1.1\r\n{headers}Content-Length: {length}\r\nConnection: close\r\n\r\n{body}");
+    let request = format!(
+        "{line} HTTP/1.1\r\n{headers}Content-Length: {length}\r\nConnection: close\r\n\r\n{body}"
+    );
     send(server, request.as_bytes())
 }
 
@@ -73,7 +79,8 @@ fn the_page_is_served_with_all_its_parts_and_nothing_from_elsewhere() {
     assert_eq!(status(&page), 200);
     assert!(page.contains("default-src 'none'") && page.contains("frame-ancestors 'none'"));
     assert!(!page.contains("http://") && !page.contains("https://"), "an outside resource");
-    let parts: Vec<&str> = page.split("src=\"").skip(1).map(|s| s.split('"').next().unwrap()).collect();
+    let parts: Vec<&str> =
+        page.split("src=\"").skip(1).map(|s| s.split('"').next().unwrap()).collect();
     assert!(parts.len() > 5, "{parts:?}");
     for part in parts.into_iter().chain(["style.css"]) {
         let answer = with_headers(server, &format!("GET /{part}"), &host, "");
@@ -101,7 +108,9 @@ fn other_hosts_and_origins_are_refused() {
     for host in ["evil.example", "127.0.0.1", "127.0.0.1:1", "localhost.evil.example:80"] {
         assert_eq!(with(&format!("Host: {host}\r\n")), 421, "{host}");
     }
-    for origin in ["http://evil.example", "null", "https://127.0.0.1:1", "http://localhost", "file://"] {
+    for origin in
+        ["http://evil.example", "null", "https://127.0.0.1:1", "http://localhost", "file://"]
+    {
         assert_eq!(with(&format!("Host: {server}\r\nOrigin: {origin}\r\n")), 403, "{origin}");
     }
     // What a form of another page could send without asking.
@@ -139,7 +148,9 @@ fn malformed_requests_end_in_a_refusal() {
         assert_eq!(status(&answer), 200, "{answer}");
         assert!(answer.contains("error"), "{answer}");
     }
-    let headers = format!("POST /answer HTTP/1.1\r\nHost: {server}\r\nContent-Type: application/json\r\nContent-Length: 2\r\nConnection: close\r\n\r\n");
+    let headers = format!(
+        "POST /answer HTTP/1.1\r\nHost: {server}\r\nContent-Type: application/json\r\nContent-Length: 2\r\nConnection: close\r\n\r\n"
+    );
     let answer = send(server, &[headers.as_bytes(), b"\xff\xfe"].concat());
     assert_eq!(status(&answer), 400, "{answer}");
 }
@@ -147,7 +158,9 @@ fn malformed_requests_end_in_a_refusal() {
 #[test]
 fn bodies_of_100_mb_are_refused_announced_or_not() {
     let server = start();
-    let head = format!("POST /answer HTTP/1.1\r\nHost: {server}\r\nContent-Type: application/json\r\nConnection: close\r\n");
+    let head = format!(
+        "POST /answer HTTP/1.1\r\nHost: {server}\r\nContent-Type: application/json\r\nConnection: close\r\n"
+    );
     let size = 100_000_000;
     let piece = vec![b' '; 1 << 20];
     // Announced: refused at once.
@@ -178,7 +191,9 @@ fn bodies_of_100_mb_are_refused_announced_or_not() {
 fn slow_clients_are_cut_off_and_hold_nobody_up() {
     let server = start();
     // One byte a second of a head, and of a body; and one that says nothing; many of each.
-    let head = format!("POST /answer HTTP/1.1\r\nHost: {server}\r\nContent-Type: application/json\r\nContent-Length: 500\r\n\r\n");
+    let head = format!(
+        "POST /answer HTTP/1.1\r\nHost: {server}\r\nContent-Type: application/json\r\nContent-Length: 500\r\n\r\n"
+    );
     let begun = Instant::now();
     let slow: Vec<_> = (0..60)
         .map(|i| {
@@ -255,7 +270,10 @@ fn ten_thousand_requests_at_once_are_survived() {
     });
     let [answered, turned_away, lost] =
         counts.iter().fold([0; 3], |sum, one| [0, 1, 2].map(|i| sum[i] + one[i]));
-    println!("{answered} answered, {turned_away} turned away, {lost} lost, in {:?}", begun.elapsed());
+    println!(
+        "{answered} answered, {turned_away} turned away, {lost} lost, in {:?}",
+        begun.elapsed()
+    );
     assert_eq!(answered + turned_away + lost, CLIENTS * EACH);
     assert!(answered > 100, "{answered}");
     // Whoever was connected got an answer; a machine that allows few open files connects few.

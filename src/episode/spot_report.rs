@@ -81,11 +81,7 @@ pub fn abstraction(episode: &Episode, models: &Models) -> Option<(Abstraction, G
     largest_cell(episode.row.method.parse().ok()?, &episode.problem, models)
 }
 
-fn largest_cell(
-    method: Method,
-    problem: &Problem,
-    models: &Models,
-) -> Option<(Abstraction, Grid)> {
+fn largest_cell(method: Method, problem: &Problem, models: &Models) -> Option<(Abstraction, Grid)> {
     let grid = *models.selector(method, &problem.vehicle)?.grid(problem.kind?);
     let found = abstractions(&problem.obstacles, problem.stance()?, &grid);
     Some((*found.first()?, grid))
