@@ -93,7 +93,8 @@ function numbers(plans) {
     put("changes", has && plan.direction_changes);
     put("clearance", has && (plan.clearance_m === null ? "none there" : plan.clearance_m < 1 ? `${(plan.clearance_m * 100).toFixed(0)} cm` : `${plan.clearance_m.toFixed(1)} m`));
     put("steps", plan && plan.expansions.toLocaleString("en"));
-    if (plan?.motion || !plan) put("drive", plan && `${plan.motion.duration_s.toFixed(1)} s`);
+    // Not told while something is dragged.
+    if (!has || plan.motion) put("drive", has && `${plan.motion.duration_s.toFixed(1)} s`);
     put("route", plan && (has ? plan.spot?.explanation ?? "a search" : REASONS[plan.no_path] ?? plan.no_path));
   });
 }
