@@ -189,10 +189,12 @@ async function showLink() {
   try {
     const shown = await files.fromLink(location.hash);
     if (!shown) return false;
-    for (const [id, key] of [["method", "method"], ["compare", "compare"], ["margin", "margin"], ["steering", "steering"]]) {
-      $(id).value = shown[key] ?? $(id).value;
+    for (const id of ["method", "compare", "margin", "steering"]) {
+      const before = $(id).value;
+      $(id).value = shown[id] ?? before;
+      // What is not to be chosen stays as it was.
+      if ($(id).value === "") $(id).value = before;
     }
-    if (!$("method").value) $("method").value = "n3p";
     put(shown.scene);
     chose();
     return true;
@@ -261,6 +263,7 @@ function listen() {
   document.addEventListener("keydown", keys);
   edit.whenChanged(() => {
     notice = null;
+    $("example").value = "";
     showVehicle();
     picture.drawScene();
     follow();
@@ -282,6 +285,8 @@ function keys(event) {
     else return;
   } else if (key === " " && !event.target.closest("button")) {
     play.toggle();
+  } else if (key === "s" || key === "g") {
+    (key === "s" ? $("start") : $("goals").firstChild).focus({ preventScroll: true });
   } else if (key === "c") {
     edit.addCar();
   } else if (key === "w") {

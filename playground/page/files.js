@@ -9,8 +9,21 @@ const files = (() => {
     return btoa(text);
   };
   const bytesOf = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-  const through = async (bytes, stream) =>
-    new Uint8Array(await new Response(new Blob([bytes]).stream().pipeThrough(stream)).arrayBuffer());
+  const through = async (bytes, stream) => {
+    const parts = [];
+    let size = 0;
+    for await (const part of pieces(new Blob([bytes]).stream().pipeThrough(stream))) {
+      parts.push(part);
+      size += part.length;
+      // A short link may hold very much of nothing.
+      if (size > LARGEST) throw new Error("too large");
+    }
+    return new Uint8Array(await new Blob(parts).arrayBuffer());
+  };
+  async function* pieces(stream) {
+    const reader = stream.getReader();
+    for (let read = await reader.read(); !read.done; read = await reader.read()) yield read.value;
+  }
 
   /** Largest file, bytes: what a request may hold, in base64. */
   const LARGEST = 14e6;
@@ -50,6 +63,7 @@ const files = (() => {
     try {
       const packed = bytesOf(text.replaceAll("-", "+").replaceAll("_", "/"));
       shown = JSON.parse(new TextDecoder().decode(await through(packed, new DecompressionStream("deflate-raw"))));
+      if (!shown.scene) throw new Error("no scene");
     } catch {
       throw new Error("the link is not whole; ask for it again");
     }

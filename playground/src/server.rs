@@ -4,7 +4,6 @@
 //! headers, connections, plans that wait and the time each may take are all limited.
 
 use std::convert::Infallible;
-use std::future::Future;
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::pin::pin;
@@ -13,7 +12,7 @@ use std::thread::available_parallelism;
 use std::time::Duration;
 
 use http_body_util::{BodyExt, Full, LengthLimitError, Limited};
-use hyper::body::{Bytes, Incoming};
+use hyper::body::{Body, Bytes, Incoming};
 use hyper::header::{self, HeaderName, HeaderValue};
 use hyper::server::conn::http1;
 use hyper::service::service_fn;
@@ -21,6 +20,7 @@ use hyper::{Method, Request, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
+use tokio::task::spawn_blocking;
 use tokio::time::{sleep, timeout};
 
 use crate::ask::answer;
@@ -29,8 +29,12 @@ use crate::ask::answer;
 pub const LARGEST_BODY: usize = 20_000_000;
 /// Connections that are served at a time; others wait to be accepted.
 const CONNECTIONS: usize = 1024;
-/// Requests that wait for a planner, or are planned, at a time; others are turned away.
-const WAITING: usize = 32;
+/// Bodies larger than this, bytes, or of a size that is not announced, and so many of them at a time: others are
+/// turned away.
+const LARGE_BODY: u64 = 256_000;
+const LARGE_BODIES: usize = 8;
+/// How long a request waits for a planner before it is turned away.
+const TURN: Duration = Duration::from_secs(20);
 /// How long a client may take for the head of a request, and for its body.
 const HEAD: Duration = Duration::from_secs(5);
 const BODY: Duration = Duration::from_secs(15);
@@ -94,7 +98,11 @@ impl Server {
     /// Serves for ever.
     pub async fn serve(self) -> Infallible {
         let room = Arc::new(Semaphore::new(CONNECTIONS));
-        let house = Arc::new(House { port: self.address.port(), waiting: Semaphore::new(WAITING) });
+        let house = Arc::new(House {
+            port: self.address.port(),
+            large: Semaphore::new(LARGE_BODIES),
+            turns: Semaphore::new(planners()),
+        });
         loop {
             let permit = Arc::clone(&room).acquire_owned().await.expect("it is never closed");
             match self.listener.accept().await {
@@ -112,12 +120,16 @@ impl Server {
     }
 }
 
+/// Plans that are made at a time: one per core.
+fn planners() -> usize {
+    available_parallelism().map_or(1, usize::from)
+}
+
 /// The runtime of a server: one thread for the network, one per core for plans.
 pub fn runtime() -> io::Result<tokio::runtime::Runtime> {
-    let planners = available_parallelism().map_or(1, usize::from);
     tokio::runtime::Builder::new_current_thread()
         .enable_all()
-        .max_blocking_threads(planners)
+        .max_blocking_threads(planners())
         // What a thread has prepared is kept.
         .thread_keep_alive(Duration::from_secs(24 * 3600))
         .build()
@@ -126,7 +138,8 @@ pub fn runtime() -> io::Result<tokio::runtime::Runtime> {
 /// What all connections share.
 struct House {
     port: u16,
-    waiting: Semaphore,
+    large: Semaphore,
+    turns: Semaphore,
 }
 
 type Answer = Response<Full<Bytes>>;
@@ -202,31 +215,34 @@ impl House {
         if kind != Some(b"application/json") {
             return plain(StatusCode::UNSUPPORTED_MEDIA_TYPE, "expected application/json\n");
         }
-        let asked = match read(request.into_body()).await {
+        let busy = || plain(StatusCode::SERVICE_UNAVAILABLE, "too much at a time; try again\n");
+        let body = request.into_body();
+        let large = if body.size_hint().exact().is_some_and(|size| size <= LARGE_BODY) {
+            None
+        } else {
+            match self.large.try_acquire() {
+                Ok(permit) => Some(permit),
+                Err(_) => return busy(),
+            }
+        };
+        let asked = match read(body).await {
             Ok(asked) => asked,
             Err(refused) => return refused,
         };
-        let Ok(_turn) = self.waiting.try_acquire() else {
-            return plain(StatusCode::SERVICE_UNAVAILABLE, "too many plans at a time; try again\n");
-        };
-        match in_turn(move || answer(&asked)).await {
+        let Ok(Ok(_turn)) = timeout(TURN, self.turns.acquire()).await else { return busy() };
+        let answered = spawn_blocking(move || answer(&asked)).await;
+        drop(large);
+        match answered {
             Ok(text) => with_kind("application/json", Bytes::from(text)),
             Err(_) => plain(StatusCode::INTERNAL_SERVER_ERROR, "the planner failed\n"),
         }
     }
 }
 
-/// Does work that takes a while on a thread for that.
-fn in_turn<T: Send + 'static>(
-    work: impl FnOnce() -> T + Send + 'static,
-) -> impl Future<Output = Result<T, tokio::task::JoinError>> {
-    tokio::task::spawn_blocking(work)
-}
-
 /// The text of a body, or why there is none.
 async fn read(body: Incoming) -> Result<String, Answer> {
     let too_large = || plain(StatusCode::PAYLOAD_TOO_LARGE, "expected at most 20 MB\n");
-    if hyper::body::Body::size_hint(&body).lower() > LARGEST_BODY as u64 {
+    if body.size_hint().lower() > LARGEST_BODY as u64 {
         return Err(too_large());
     }
     let collected = timeout(BODY, Limited::new(body, LARGEST_BODY).collect()).await;
