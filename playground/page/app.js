@@ -66,6 +66,8 @@ function show({ plans, error }, asked) {
   const reason = plans[0].no_path;
   say(reason ? `No path by ${titleOf(plans[0].method)}: ${REASONS[reason] ?? reason}.` : notice);
   picture.show(plans, null);
+  if (isNew) picture.fit();
+  isNew = false;
   numbers(plans);
   tour.take(plans[0]);
   if (asked.plan.wish.motion) play.take(plans[0].motion ?? null);
@@ -148,6 +150,9 @@ function options(select, entries) {
   select.replaceChildren(...entries.map(([value, words]) => new Option(words, value)));
 }
 
+/** Whether the scene was put on the page just now: its plan is fitted into the picture. */
+let isNew = false;
+
 /** Puts a scene on the page. */
 function put(scene, name = "") {
   notice = null;
@@ -157,6 +162,7 @@ function put(scene, name = "") {
   $("example").value = name;
   picture.show([], null);
   picture.fit();
+  isNew = true;
   picture.drawScene();
   follow();
 }

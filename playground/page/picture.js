@@ -58,7 +58,7 @@ const picture = (() => {
   /** Shows start, goals and the path, and what is next to them. */
   function fit() {
     const { scene } = lot;
-    const reach = scene.vehicle.length * 0.75;
+    const reach = scene.vehicle.length * 0.85;
     const seen = [scene.start, ...goalsOf(scene), ...plans.flatMap((plan) => plan.path?.poses ?? [])];
     const box = boxAround(seen);
     // Below the tools and above the legend.

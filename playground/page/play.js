@@ -37,6 +37,7 @@ const play = (() => {
   function draw() {
     const { vehicle } = lot.scene;
     const { pose, steer, speed, gear } = momentAt(time);
+    picture.svg.classList.add("playing");
     const standing = Math.abs(speed) < 0.01;
     picture.drawVehicle(car, vehicle, pose, `moving ${gear > 0 ? "forward" : "backward"}`, "");
     for (const node of car.querySelectorAll(".steered")) {
@@ -90,6 +91,7 @@ const play = (() => {
       motion = next;
       time = 0;
       car.replaceChildren();
+      picture.svg.classList.remove("playing");
       delete car.dataset.key;
       wheel.style.rotate = "";
       state.textContent = motion ? `${motion.duration_s.toFixed(1)} s` : "";
