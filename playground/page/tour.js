@@ -69,7 +69,7 @@ const tour = (() => {
       words.textContent = `The manoeuvres it knows, the most promising first. Each is checked exactly. Number ${i + 1} of ${count} tried: ${fate}. `
         + "The cheapest that is joined wins; only if none is, N3P searches.";
       i += 1;
-      if (i < tried.length) timer = setTimeout(next, Math.max(120, Math.min(900, 9000 / tried.length)));
+      if (i < tried.length) timer = setTimeout(next, Math.max(40, Math.min(900, 8000 / tried.length)));
     };
     next();
     return words.textContent;

@@ -169,7 +169,10 @@ fn load(file: &Load) -> Result<Scene, Failure> {
     let path = Path::new(&file.name);
     let text = || {
         let text = String::from_utf8(bytes).map_err(|_| wrong("is not text; expected a scene"))?;
-        Ok::<_, Failure>(text.trim_start_matches('\u{feff}').to_owned())
+        match text.trim_start_matches('\u{feff}') {
+            empty if empty.trim().is_empty() => Err(wrong("is empty; expected a scene")),
+            text => Ok(text.to_owned()),
+        }
     };
     let mut scene = match path.extension().and_then(|e| e.to_str()) {
         Some("json") => Scene::from_json(&text()?, path)?,

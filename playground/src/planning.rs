@@ -64,7 +64,7 @@ const SLOW_US: f64 = 30_000.0;
 /// Poses of a path that are told, at most.
 const POSES: usize = 4_000;
 /// Manoeuvres that are told of as tried, at most.
-const TRIED: usize = 60;
+const TRIED: usize = 400;
 /// Poses of a manoeuvre lie so far apart, metres for a usual car.
 const COARSE: f64 = 0.25;
 
