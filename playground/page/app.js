@@ -37,7 +37,7 @@ function request() {
     plan: {
       scene: lot.scene,
       methods: compare ? [method, compare] : [method],
-      wish: { margin, standstill_steering: steering, motion: still, explain: still && tour.open },
+      wish: { margin, standstill_steering: steering, rounds: still ? 5 : 1, motion: still, explain: still && tour.open },
     },
   };
 }

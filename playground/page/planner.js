@@ -78,8 +78,6 @@ class Follower {
       this.#wanted = false;
       const request = this.#asks();
       if (request) this.#shows(await planner.ask(request), request);
-      // Let the browser paint what was shown.
-      await new Promise(requestAnimationFrame);
     }
     this.#running = false;
   }

@@ -1,5 +1,7 @@
 //! A scene planned by one method, as the page shows it.
 
+use std::ops::RangeInclusive;
+
 use n3p::curves::smoothing::StandstillSteering;
 use n3p::curves::{Path, Segment, TrajectoryLimits};
 use n3p::episode::{SpotReport, clearance};
@@ -27,6 +29,8 @@ pub struct Wish {
     standstill_steering: StandstillSteering,
     /// How long the planner goes on once it has a path.
     effort: Effort,
+    /// So many rounds of plans are timed, 1 to 9: the median counts.
+    rounds: usize,
     /// Whether the path is also told in time.
     motion: bool,
     /// Whether it is also told what was tried, by `n3p`.
@@ -41,6 +45,7 @@ impl Default for Wish {
             margin: Problem::MARGIN,
             standstill_steering: StandstillSteering::default(),
             effort: Effort::default(),
+            rounds: 5,
             motion: false,
             explain: false,
             file: false,
@@ -55,10 +60,10 @@ const CORNERS: usize = 200_000;
 /// From start to goal, at most, in vehicle lengths.
 const LENGTHS: f64 = 200.0;
 /// A plan is made again and again for so long, microseconds, or so many times: one alone is too short for
-/// the clock of a browser. The median of so many such rounds counts: other programs want to run, too.
-const ROUND_US: f64 = 400.0;
-const TIMES: usize = 8;
-const ROUNDS: usize = 5;
+/// the clock of a browser. The median of some such rounds counts: other programs want to run, too.
+const ROUND_US: f64 = 1_000.0;
+const TIMES: usize = 20;
+const ROUNDS: RangeInclusive<usize> = 1..=9;
 /// A first plan that takes longer than this, microseconds, is not made again.
 const SLOW_US: f64 = 30_000.0;
 /// Poses of a path that are told, at most.
@@ -72,12 +77,16 @@ const COARSE: f64 = 0.25;
 pub fn plan(scene: &Scene, method: &str, wish: &Wish, desk: &mut Desk) -> Result<Value, Failure> {
     let method: Method = method.parse().map_err(|e| Failure::of(Some("method"), e))?;
     check_size(scene)?;
+    if !ROUNDS.contains(&wish.rounds) {
+        let message = format!("rounds is {}; expected 1 to {}", wish.rounds, ROUNDS.end());
+        return Err(Failure::of(Some("rounds"), message));
+    }
     let terms =
         Terms { margin: wish.margin, standstill: wish.standstill_steering, ..Terms::default() };
     let problems = scene.all_goals().len() * if scene.goal_tolerance.is_some() { 16 } else { 1 };
     let budget = Budget { max_expansions: EXPANSIONS / problems, effort: wish.effort };
     let planner = desk.planner(method, &scene.vehicle)?;
-    let (planned, took_us, times) = timed(planner, scene, terms, budget)?;
+    let (planned, took_us, times) = timed(planner, scene, terms, budget, wish.rounds)?;
     let models = desk.models(&scene.vehicle)?;
     let mut told = tell(scene, method, &planned, wish, models);
     told.insert("plan_us".to_owned(), rounded(took_us, 10.0));
@@ -121,6 +130,7 @@ fn timed(
     scene: &Scene,
     terms: Terms,
     budget: Budget,
+    most_rounds: usize,
 ) -> Result<(Planned, f64, usize), Failure> {
     let begun = now_us();
     let planned = goals::plan(planner, scene, terms, budget)?;
@@ -129,7 +139,7 @@ fn timed(
         return Ok((planned, first, 1));
     }
     let (mut rounds, mut plans) = (Vec::new(), 0);
-    while rounds.len() < ROUNDS {
+    while rounds.len() < most_rounds {
         let begun = now_us();
         let mut times = 0;
         let mut took = 0.0;
@@ -141,7 +151,7 @@ fn timed(
         rounds.push(took / times as f64);
         plans += times;
         // What takes long needs no second opinion.
-        if took > SLOW_US / ROUNDS as f64 {
+        if took > SLOW_US / 4.0 {
             break;
         }
     }
