@@ -87,7 +87,11 @@ function numbers(plans) {
   const table = $("numbers");
   table.classList.toggle("two", $("compare").value !== "");
   [["a", plans[0], $("method").value], ["b", plans[1], $("compare").value]].forEach(([column, plan, method]) => {
-    const put = (row, text) => { $(`${row}-${column}`).textContent = text ?? "–"; };
+    const put = (row, text) => {
+      const cell = $(`${row}-${column}`);
+      const words = String(text ?? "–");
+      if (cell.textContent !== words) cell.textContent = words;
+    };
     put("name", method ? titleOf(method) : "");
     const has = plan?.path;
     put("time", plan && duration(plan.plan_us));

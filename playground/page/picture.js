@@ -10,6 +10,21 @@ const picture = (() => {
     parent?.append(made);
     return made;
   };
+  /** Sets what is not so already: the browser draws anew whatever is set. */
+  const set = (node, attributes) => {
+    for (const [key, value] of Object.entries(attributes)) {
+      if (node.getAttribute(key) !== String(value)) node.setAttribute(key, value);
+    }
+  };
+  /** What is known of an obstacle, found out once: its corners never change. */
+  const known = new WeakMap();
+  const about = (points) => {
+    if (!known.has(points)) {
+      const kind = isCar(points) ? "parked" : points.length === 2 ? "wall" : "block";
+      known.set(points, { kind, centre: centreOf(points), drawn: text(points) });
+    }
+    return known.get(points);
+  };
   const text = (points) => points.map(([x, y]) => `${+x.toFixed(4)},${+y.toFixed(4)}`).join(" ");
   const line = (poses) => `M${poses.map(([x, y]) => `${+x.toFixed(3)} ${+y.toFixed(3)}`).join("L")}`;
   const transform = ([x, y, turn]) => `translate(${x} ${y}) rotate(${turn * 180 / Math.PI})`;
@@ -99,12 +114,12 @@ const picture = (() => {
       drawCar(group, vehicle, kind, name);
       group.dataset.key = key;
     }
-    group.setAttribute("transform", transform(pose));
+    set(group, { transform: transform(pose) });
     // Names are read from the left.
     const label = group.querySelector(".name");
     const { length, rear_overhang: back } = vehicle;
     const turn = Math.cos(pose[2]) < -0.01 ? " rotate(180)" : "";
-    label?.setAttribute("transform", `translate(${length * 0.31 - back} 0) scale(1 -1)${turn}`);
+    if (label) set(label, { transform: `translate(${length * 0.31 - back} 0) scale(1 -1)${turn}` });
   }
 
   /** As many children of a layer as there are things, each focusable. */
@@ -119,14 +134,17 @@ const picture = (() => {
   const told = (name, [x, y, turn]) => `${name} at ${metres(x)}, ${metres(y)}, heading ${degrees(turn)}`;
 
   function mark(node, thing, label, reachable) {
-    node.dataset.what = thing.what;
-    node.dataset.index = thing.index ?? 0;
-    node.setAttribute("tabindex", reachable || same(thing, selected) ? 0 : -1);
-    node.setAttribute("aria-label", label);
-    node.setAttribute("aria-pressed", same(thing, selected));
+    set(node, {
+      "data-what": thing.what,
+      "data-index": thing.index ?? 0,
+      tabindex: reachable || same(thing, selected) ? 0 : -1,
+      "aria-label": label,
+      "aria-pressed": same(thing, selected),
+    });
     node.classList.toggle("wrong", wrong !== null && same(thing, wrong));
   }
 
+  let drawnPoints;
   /** What can be reached by Tab: the nearest to the goal. */
   const REACHABLE = 16;
 
@@ -139,23 +157,24 @@ const picture = (() => {
       drawVehicle(node, scene.vehicle, goals[index], "thing goal", "Goal");
       mark(node, { what: "goal", index }, told("Goal", goals[index]), true);
     });
-    const centres = scene.obstacles.map(centreOf);
-    const byNearness = centres.map((c, i) => [distance(c, goals[0]), i]).sort((a, b) => a[0] - b[0]);
+    const obstacles = scene.obstacles.map(about);
+    const byNearness = obstacles.map(({ centre }, i) => [distance(centre, goals[0]), i]).sort((a, b) => a[0] - b[0]);
     const near = new Set(byNearness.slice(0, REACHABLE).map(([, i]) => i));
     matchChildren(layer("obstacles"), scene.obstacles.length, "polygon").forEach((node, index) => {
-      const points = scene.obstacles[index];
-      const kind = isCar(points) ? "parked" : points.length === 2 ? "wall" : "block";
-      node.setAttribute("class", `thing ${kind}`);
-      node.setAttribute("points", text(points));
+      const { kind, centre, drawn } = obstacles[index];
+      set(node, { class: `thing ${kind}`, points: drawn });
       const name = { parked: "Parked car", wall: "Wall", block: "Obstacle" }[kind];
-      mark(node, { what: "obstacle", index }, `${name} at ${metres(centres[index][0])}, ${metres(centres[index][1])}`, near.has(index));
+      mark(node, { what: "obstacle", index }, `${name} at ${metres(centre[0])}, ${metres(centre[1])}`, near.has(index));
     });
-    layer("points").setAttribute("d", (scene.points ?? []).map(([x, y]) => `M${x} ${y}h0`).join(""));
+    if (scene.points !== drawnPoints) {
+      drawnPoints = scene.points;
+      layer("points").setAttribute("d", (scene.points ?? []).map(([x, y]) => `M${x} ${y}h0`).join(""));
+    }
     const bounds = layer("bounds");
     bounds.toggleAttribute("hidden", !scene.bounds);
     if (scene.bounds) {
       const [x, y, right, top] = scene.bounds;
-      for (const [key, value] of Object.entries({ x, y, width: right - x, height: top - y })) bounds.setAttribute(key, value);
+      set(bounds, { x, y, width: right - x, height: top - y });
     }
     drawHandles();
   }
@@ -197,8 +216,8 @@ const picture = (() => {
     svg.classList.toggle("stale", wrong !== null);
     const spot = plans[0]?.spot;
     const [lane, space] = spot?.lane_and_spot ?? [[], []];
-    layer("lane").setAttribute("points", text(lane));
-    layer("spot").setAttribute("points", text(space));
+    set(layer("lane"), { points: text(lane) });
+    set(layer("spot"), { points: text(space) });
     const preparatory = spot?.preparatory;
     layer("preparatory").toggleAttribute("hidden", !preparatory);
     if (preparatory) drawVehicle(layer("preparatory"), vehicle, preparatory, "prepared", "");
