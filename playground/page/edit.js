@@ -100,6 +100,7 @@ const edit = (() => {
 
   svg.addEventListener("pointerdown", (event) => {
     if (event.button > 0) return;
+    picture.measure();
     pointers.set(event.pointerId, event);
     svg.setPointerCapture(event.pointerId);
     if (pointers.size > 1) {
@@ -182,6 +183,7 @@ const edit = (() => {
 
   svg.addEventListener("wheel", (event) => {
     event.preventDefault();
+    picture.measure();
     picture.zoom(Math.exp(-event.deltaY * 0.0015), picture.at(event));
   }, { passive: false });
 

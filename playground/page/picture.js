@@ -52,9 +52,12 @@ const picture = (() => {
     drawHandles();
   }
 
+  /** Where the picture is in the window: measured when a gesture begins, because it takes a while. */
+  let box = svg.getBoundingClientRect();
+  const measure = () => { box = svg.getBoundingClientRect(); };
+
   /** The point of the world under a point of the window. */
   function at(event) {
-    const box = svg.getBoundingClientRect();
     return [
       view.x + (event.clientX - box.left - box.width / 2) / view.scale,
       view.y - (event.clientY - box.top - box.height / 2) / view.scale,
@@ -264,7 +267,7 @@ const picture = (() => {
 
   return {
     svg, view, element, line, layer, transform,
-    at, zoom, fit, look, drawScene, drawVehicle, turningHandle,
+    measure, at, zoom, fit, look, drawScene, drawVehicle, turningHandle,
     /** Draws answers: the plans, and what is wrong with the scene, if anything is. */
     show(newPlans, newWrong) {
       if (newPlans) plans = newPlans;

@@ -26,7 +26,7 @@ fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         Err(message) => {
-            eprintln!("error: {message}\nFor more information, try '--help'.");
+            eprintln!("error: {message}\nUsage: n3p-play [--port N] [--open]");
             return ExitCode::from(2);
         }
     };

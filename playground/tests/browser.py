@@ -72,11 +72,8 @@ class Tries:
         """The plan follows the start, thirty times a second or more."""
         self.fresh()
         length = self.text("length-a")
-        x, y = self.where("along(lot.scene.start, middleOf(lot.scene.vehicle))")
-        # Twice around, a move every refresh of a screen.
-        points = [(x + 40 * math.sin(i * math.tau / 75), y + 12 * (1 - math.cos(i * math.tau / 75))) for i in range(151)]
         # Other programs may want the same cores for a while.
-        rates = [self.rate_of(points) for _ in range(3)]
+        rates = [self.rate_of() for _ in range(3)]
         print(f"  {max(rates):.0f} plans a second ({', '.join(f'{rate:.0f}' for rate in rates)})")
         self.settle()
         assert self.text("length-a") != length
@@ -86,11 +83,18 @@ class Tries:
             self.browser.key("z", 90, modifiers=2)
         self.settle()
         assert self.text("length-a") == length
-        self.browser.drag(points[::5], lambda i: i % 4 or self.picture("drag"))
+        self.browser.drag(self.around()[::5], lambda i: i % 4 or self.picture("drag"))
         assert max(rates) >= LEAST_RATE, f"{max(rates):.0f} plans a second"
 
-    def rate_of(self, points) -> float:
-        """Plans a second while the pointer is dragged through these points, 60 a second."""
+    def around(self):
+        """Where to drag the start: once and a half around, a move every refresh of a screen."""
+        x, y = self.where("along(lot.scene.start, middleOf(lot.scene.vehicle))")
+        turn = math.tau / 75
+        return [(x + 40 * math.sin(i * turn), y + 12 * (1 - math.cos(i * turn))) for i in range(113)]
+
+    def rate_of(self) -> float:
+        """Plans a second while the start is dragged, 60 moves a second."""
+        points = self.around()
         begun, before = time.monotonic(), self.browser.run("rate.total")
 
         def between(i):

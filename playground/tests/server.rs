@@ -281,3 +281,24 @@ fn ten_thousand_requests_at_once_are_survived() {
     assert!(begun.elapsed() < Duration::from_secs(120), "{:?}", begun.elapsed());
     assert_answers(server);
 }
+
+#[test]
+fn the_program_says_what_is_wrong_with_its_arguments() {
+    let run = |arguments: &[&str]| {
+        let program = std::process::Command::new(env!("CARGO_BIN_EXE_n3p-play"))
+            .args(arguments)
+            .output()
+            .unwrap();
+        let said = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (program.status.code(), said(program.stdout), said(program.stderr))
+    };
+    let (code, usage, _) = run(&["--help"]);
+    assert!(code == Some(0) && usage.contains("--port"), "{usage}");
+    for wrong in [&["--port", "99999"][..], &["--port"], &["--host", "0.0.0.0"]] {
+        let (code, _, said) = run(wrong);
+        assert!(code == Some(2) && said.lines().count() == 2 && said.contains("--port"), "{said}");
+    }
+    let taken = start().port().to_string();
+    let (code, _, said) = run(&["--port", &taken]);
+    assert!(code == Some(1) && said.contains("--port 0"), "{said}");
+}
