@@ -65,7 +65,7 @@ const ROUND_US: f64 = 1_000.0;
 const TIMES: usize = 20;
 const ROUNDS: RangeInclusive<usize> = 1..=9;
 /// A first plan that takes longer than this, microseconds, is not made again.
-const SLOW_US: f64 = 30_000.0;
+const SLOW_US: f64 = 200_000.0;
 /// Poses of a path that are told, at most.
 const POSES: usize = 4_000;
 /// Manoeuvres that are told of as tried, at most.
@@ -151,7 +151,7 @@ fn timed(
         rounds.push(took / times as f64);
         plans += times;
         // What takes long needs no second opinion.
-        if took > SLOW_US / 4.0 {
+        if took > 10.0 * ROUND_US {
             break;
         }
     }
