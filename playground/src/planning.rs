@@ -202,8 +202,9 @@ fn tell(
 fn coarse(file: &PathFile) -> Value {
     let (last, step) =
         (file.poses.len().saturating_sub(1), file.poses.len().div_ceil(POSES).max(1));
-    let keeps =
-        |i: &usize| i % step == 0 || *i == last || (*i > 0 && file.gears[*i] != file.gears[*i - 1]);
+    let keeps = |i: &usize| {
+        i.is_multiple_of(step) || *i == last || (*i > 0 && file.gears[*i] != file.gears[*i - 1])
+    };
     let kept: Vec<usize> = (0..file.poses.len()).filter(keeps).collect();
     json!({
         "poses": kept.iter().map(|&i| pose(file.poses[i])).collect::<Value>(),
