@@ -49,7 +49,7 @@ const REASONS = {
   "not applicable": "this method is not made for such a spot",
 };
 
-const rate = { since: performance.now(), count: 0, total: 0 };
+const rate = { since: performance.now(), count: 0, total: 0, shown: 0 };
 
 function show({ plans, error }, asked) {
   rate.count += 1;
@@ -68,7 +68,11 @@ function show({ plans, error }, asked) {
   picture.show(plans, null);
   if (isNew) picture.fit();
   isNew = false;
-  numbers(plans);
+  // Nobody reads sixty numbers a second.
+  if (!edit.dragging || performance.now() - rate.shown > 90) {
+    rate.shown = performance.now();
+    numbers(plans);
+  }
   tour.take(plans[0]);
   if (asked.plan.wish.motion) play.take(plans[0].motion ?? null);
   else play.take(null);

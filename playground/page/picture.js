@@ -203,7 +203,7 @@ const picture = (() => {
     let d = "";
     let last = null;
     for (const pose of path.poses) {
-      if (last && distance(pose, last) + Math.abs(pose[2] - last[2]) * vehicle.length / 2 < vehicle.length * 0.03) continue;
+      if (last && distance(pose, last) + Math.abs(pose[2] - last[2]) * vehicle.length / 2 < vehicle.length * 0.05) continue;
       last = pose;
       d += `M${text(footprint(vehicle, pose)).replaceAll(" ", "L")}Z`;
     }

@@ -22,8 +22,10 @@ LEAST_RATE = 30
 
 
 class Tries:
-    def __init__(self, browser: Chromium, address: str, pictures: Path | None, name: str):
+    def __init__(self, browser: Chromium, address: str, pictures: Path | None, name: str, others: list[int]):
         self.browser, self.address, self.pictures, self.name = browser, address, pictures, name
+        # Programs that plan for the page.
+        self.others = others
         self.taken = 0
 
     def picture(self, what: str):
@@ -72,9 +74,9 @@ class Tries:
         """The plan follows the start, thirty times a second or more."""
         self.fresh()
         length = self.text("length-a")
-        # Other programs may want the same cores for a while.
-        rates = [self.rate_of() for _ in range(3)]
-        print(f"  {max(rates):.0f} plans a second ({', '.join(f'{rate:.0f}' for rate in rates)})")
+        rates = [self.rates() for _ in range(3)]
+        told = ", ".join(f"{by_clock:.0f} ({by_core:.0f})" for by_clock, by_core in rates)
+        print(f"  plans a second (of one core's time): {told}")
         self.settle()
         assert self.text("length-a") != length
         # Each drag is one step.
@@ -84,7 +86,9 @@ class Tries:
         self.settle()
         assert self.text("length-a") == length
         self.browser.drag(self.around()[::5], lambda i: i % 4 or self.picture("drag"))
-        assert max(rates) >= LEAST_RATE, f"{max(rates):.0f} plans a second"
+        # Other programs may want the same cores: what counts is the time that the browser had.
+        assert max(by_core for _, by_core in rates) >= LEAST_RATE, told
+        assert max(by_clock for by_clock, _ in rates) >= LEAST_RATE / 3, told
 
     def around(self):
         """Where to drag the start: once and a half around, a move every refresh of a screen."""
@@ -92,17 +96,20 @@ class Tries:
         turn = math.tau / 75
         return [(x + 40 * math.sin(i * turn), y + 12 * (1 - math.cos(i * turn))) for i in range(113)]
 
-    def rate_of(self) -> float:
-        """Plans a second while the start is dragged, 60 moves a second."""
+    def rates(self) -> tuple[float, float]:
+        """Plans a second while the start is dragged, 60 moves a second: by the clock, and by the processor time of
+        the browser, all its drawing included, and of the server."""
         points = self.around()
-        begun, before = time.monotonic(), self.browser.run("rate.total")
+        taken = lambda: self.browser.processor_seconds(*self.others)
+        begun, before, taken_before = time.monotonic(), self.browser.run("rate.total"), taken()
 
         def between(i):
             time.sleep(max(0.0, begun + (i + 1) / 60 - time.monotonic()))
 
         self.browser.drag(points, between)
-        seconds = time.monotonic() - begun
-        return (self.browser.run("rate.total") - before) / seconds
+        seconds, spent = time.monotonic() - begun, taken() - taken_before
+        plans = self.browser.run("rate.total") - before
+        return plans / seconds, plans / spent
 
     def moves_cars_and_turns_them(self):
         self.fresh()
@@ -324,7 +331,7 @@ class Tries:
            keys, errors, explains, on_a_phone, in_the_dark]
 
 
-def attempt(address: str, name: str, pictures: Path | None, only: str | None) -> int:
+def attempt(address: str, name: str, pictures: Path | None, only: str | None, others: list[int]) -> int:
     print(f"{name}:")
     failed = 0
     browser = Chromium()
@@ -332,7 +339,7 @@ def attempt(address: str, name: str, pictures: Path | None, only: str | None) ->
         for one in Tries.ALL:
             if only and only not in one.__name__:
                 continue
-            tries = Tries(browser, address, pictures, f"{name}-{one.__name__}")
+            tries = Tries(browser, address, pictures, f"{name}-{one.__name__}", others)
             try:
                 one(tries)
                 assert not browser.complaints, browser.complaints
@@ -363,12 +370,12 @@ def main() -> int:
     if given.server:
         server = subprocess.Popen([given.server, "--port", "0"], stdout=subprocess.PIPE, text=True)
         try:
-            failed += attempt(server.stdout.readline().strip(), "server", given.pictures, given.only)
+            failed += attempt(server.stdout.readline().strip(), "server", given.pictures, given.only, [server.pid])
         finally:
             server.terminate()
             server.wait()
     if given.file:
-        failed += attempt(given.file.resolve().as_uri(), "file", given.pictures, given.only)
+        failed += attempt(given.file.resolve().as_uri(), "file", given.pictures, given.only, [])
     print("all is well" if not failed else f"{failed} failed")
     return 1 if failed else 0
 
