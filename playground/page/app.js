@@ -12,6 +12,8 @@ function duration(us) {
   return us < 1e6 ? `${(us / 1000).toFixed(us < 1e4 ? 1 : 0)} ms` : `${(us / 1e6).toFixed(1)} s`;
 }
 
+const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
 const chosen = () => ({
   method: $("method").value,
   compare: $("compare").value,
@@ -24,7 +26,7 @@ let notice = null;
 
 function say(text, isError = true) {
   $("message").hidden = !text;
-  $("message").textContent = text ?? "";
+  $("message").textContent = sentence(text ?? "");
   $("message").classList.toggle("error", isError);
 }
 
@@ -57,7 +59,7 @@ function show({ plans, error }, asked) {
   document.documentElement.dataset.plans = rate.total;
   if (error) {
     say(error.message);
-    picture.show(null, wrongThing(error));
+    picture.show(null, wrongThings(error));
     numbers([]);
     play.take(null);
     tour.take(null);
@@ -78,11 +80,15 @@ function show({ plans, error }, asked) {
   else play.take(null);
 }
 
-/** What an error is about, for the picture to mark. */
-function wrongThing({ field }) {
+/** What an error is about, for the picture to mark: start or goal, and what it touches. */
+function wrongThings({ field, touches }) {
+  const things = [];
   const goal = /^goal(?:s\[(\d+)\])?$/.exec(field ?? "");
-  if (goal) return { what: "goal", index: Number(goal[1] ?? 0) };
-  return field === "start" ? { what: "start" } : { what: "nothing" };
+  if (goal) things.push({ what: "goal", index: Number(goal[1] ?? 0) });
+  if (field === "start") things.push({ what: "start" });
+  const obstacle = /^obstacles\[(\d+)\]$/.exec(touches ?? "");
+  if (obstacle) things.push({ what: "obstacle", index: Number(obstacle[1]) });
+  return things;
 }
 
 const titleOf = (name) => catalogue.methods.find((m) => m.name === name)?.title ?? name;

@@ -144,7 +144,7 @@ const picture = (() => {
       "aria-label": label,
       "aria-pressed": same(thing, selected),
     });
-    node.classList.toggle("wrong", wrong !== null && same(thing, wrong));
+    node.classList.toggle("wrong", wrong !== null && wrong.some((other) => same(thing, other)));
   }
 
   let drawnPoints;
@@ -268,7 +268,7 @@ const picture = (() => {
   return {
     svg, view, element, line, layer, transform,
     measure, at, zoom, fit, look, drawScene, drawVehicle, turningHandle,
-    /** Draws answers: the plans, and what is wrong with the scene, if anything is. */
+    /** Draws answers: the plans, and the things that are wrong where there can be none; else null. */
     show(newPlans, newWrong) {
       if (newPlans) plans = newPlans;
       wrong = newWrong;

@@ -46,7 +46,7 @@ const tour = (() => {
       title: "The path",
       show() {
         if (!plan?.path) return "There is no path here. Move something.";
-        return `${plan.spot?.explanation ?? "a search"}: ${m(plan.length_m)} in ${duration(plan.plan_us)}. `
+        return `${sentence(plan.spot?.explanation ?? "a search")}: ${m(plan.length_m)} in ${duration(plan.plan_us)}. `
           + "Every path is checked exactly along the whole motion before it leaves the planner. Compare it with Hybrid A* on the same scene:";
       },
     },
