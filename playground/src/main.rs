@@ -1,5 +1,6 @@
 //! `n3p-play`: the page on which cars are dragged while N3P plans.
 
+use std::io::Write;
 use std::process::{Command, ExitCode};
 
 use n3p_play::server::{Server, runtime};
@@ -22,7 +23,7 @@ fn main() -> ExitCode {
     let arguments = match parse(std::env::args().skip(1)) {
         Ok(Some(arguments)) => arguments,
         Ok(None) => {
-            println!("{USAGE}");
+            say(USAGE);
             return ExitCode::SUCCESS;
         }
         Err(message) => {
@@ -47,12 +48,17 @@ fn run(arguments: &Arguments) -> Result<std::convert::Infallible, String> {
             format!("cannot listen on port {port} of 127.0.0.1: {e}; try another, such as --port 0")
         })?;
         let url = server.url();
-        println!("{url}");
+        say(&url);
         if arguments.open {
             open(&url);
         }
         Ok(server.serve().await)
     })
+}
+
+/// Prints a line, to whoever still reads.
+fn say(line: &str) {
+    let _ = writeln!(std::io::stdout(), "{line}");
 }
 
 /// Asks the desktop for a browser; where there is none the address is on the screen.
