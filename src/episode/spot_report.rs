@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::Episode;
 use crate::geometry::{Polygon, Pose};
 use crate::n3p::{Method, Models};
+use crate::planners::{PlanResult, Problem};
 use crate::world::ParkingType;
 use crate::world::abstraction::{Abstraction, abstractions};
 use crate::world::cell::Grid;
@@ -41,10 +42,22 @@ impl SpotReport {
     /// The report of an episode whose method was built from `models`; `None` for methods that are
     /// not guided, or without a plan.
     pub fn new(episode: &Episode, models: &Models) -> Option<Self> {
-        let guidance = episode.result.guidance.as_ref()?;
-        let problem = &episode.problem;
-        let measured = abstraction(episode, models).map(|(a, _)| a.measured);
-        let corners = regions(episode, models)
+        let method = episode.row.method.parse().ok()?;
+        Self::of(method, &episode.problem, &episode.result, models)
+    }
+
+    /// The report of what `method`, built from `models`, made of `problem`; `None` as above.
+    pub fn of(
+        method: Method,
+        problem: &Problem,
+        result: &PlanResult,
+        models: &Models,
+    ) -> Option<Self> {
+        let guidance = result.guidance.as_ref()?;
+        let seen = largest_cell(method, problem, models);
+        let measured = seen.as_ref().map(|(a, _)| a.measured);
+        let corners = seen
+            .map(|seen| regions_in_world(problem, seen))
             .map(|both| both.map(|r| r.vertices().iter().map(|v| [v.x, v.y]).collect()));
         Some(Self {
             parking_type: problem.kind,
@@ -64,9 +77,11 @@ impl SpotReport {
 /// The largest cell that a guided planner's model sees around the spot, and its grid; `None` for
 /// other planners, and where the scene has no such structure.
 pub fn abstraction(episode: &Episode, models: &Models) -> Option<(Abstraction, Grid)> {
-    let problem = &episode.problem;
     episode.result.guidance.as_ref()?;
-    let method: Method = episode.row.method.parse().ok()?;
+    largest_cell(episode.row.method.parse().ok()?, &episode.problem, models)
+}
+
+fn largest_cell(method: Method, problem: &Problem, models: &Models) -> Option<(Abstraction, Grid)> {
     let grid = *models.selector(method, &problem.vehicle)?.grid(problem.kind?);
     let found = abstractions(problem.around_spot(), problem.stance()?, &grid);
     Some((*found.first()?, grid))
@@ -74,9 +89,12 @@ pub fn abstraction(episode: &Episode, models: &Models) -> Option<(Abstraction, G
 
 /// Its lane and its spot, in the scene's frame.
 pub fn regions(episode: &Episode, models: &Models) -> Option<[Polygon; 2]> {
-    let (found, grid) = abstraction(episode, models)?;
-    let frame = &episode.problem.frame;
-    Some(found.regions(&grid).map(|region| region.map(|v| frame.world_from_local_point(v))))
+    Some(regions_in_world(&episode.problem, abstraction(episode, models)?))
+}
+
+fn regions_in_world(problem: &Problem, (found, grid): (Abstraction, Grid)) -> [Polygon; 2] {
+    let frame = &problem.frame;
+    found.regions(&grid).map(|region| region.map(|v| frame.world_from_local_point(v)))
 }
 
 impl fmt::Display for SpotReport {

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use crate::curves::{Path, Segment};
 use crate::geometry::{Pose, Vec2};
 use crate::planners::hybrid_astar::{Entry, GoalSet, Leg};
-use crate::planners::library::{LibrarySearch, Verdicts};
+use crate::planners::library::{LibrarySearch, Tried, Verdicts};
 use crate::planners::{
     Budget, Effort, Guidance, HybridAStar, HybridAStarConfig, NoPath, PlanResult, Planner, Problem,
     Route,
@@ -461,6 +461,14 @@ impl Planner for GuidedPlanner {
 }
 
 impl GuidedPlanner {
+    /// What [`Planner::plan`] says, and the known manoeuvres that it tried, in that order: for those who
+    /// explain a plan.
+    pub fn plan_and_tell(&mut self, problem: &Problem, budget: Budget) -> (PlanResult, Vec<Tried>) {
+        self.library_search.keep_trail();
+        let result = self.plan(problem, budget);
+        (result, self.library_search.take_trail())
+    }
+
     /// The result with `path`, which is checked.
     fn certify(
         &self,

@@ -170,6 +170,33 @@ pub struct LibraryPlan {
     pub preparatory: Pose,
 }
 
+/// A manoeuvre that was tried, in the problem's frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tried {
+    /// Where it begins.
+    pub preparatory: Pose,
+    /// Its motions from there, in driving order.
+    pub motions: Vec<Segment>,
+    /// What came of it.
+    pub fate: Fate,
+}
+
+/// What came of a manoeuvre that was tried.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Fate {
+    /// It touches an obstacle.
+    Touches,
+    /// It is free, but no free curve joins it at a cost below that of what is known already.
+    NotJoined,
+    /// It is free and joined.
+    Joined {
+        /// The curve from the start to where the manoeuvre begins.
+        curve: Vec<Segment>,
+        /// The cost of both.
+        cost: f64,
+    },
+}
+
 /// Looks plans up; buffers and the table of estimates are reused.
 #[derive(Debug, Default)]
 pub struct LibrarySearch {
@@ -180,6 +207,8 @@ pub struct LibrarySearch {
     estimates: Vec<f32>,
     approaches: Approaches,
     analytic: AnalyticExpansion,
+    /// What was tried, where somebody asked.
+    trail: Option<Vec<Tried>>,
 }
 
 /// One problem being looked up.
@@ -277,6 +306,16 @@ impl LibrarySearch {
         look_up.next(bound, usize::MAX).or_else(|| look_up.long_way(bound, usize::MAX))
     }
 
+    /// From now on keeps what is tried, for [`LibrarySearch::take_trail`].
+    pub fn keep_trail(&mut self) {
+        self.trail = Some(Vec::new());
+    }
+
+    /// What was tried since [`LibrarySearch::keep_trail`], in that order; nothing more is kept.
+    pub fn take_trail(&mut self) -> Vec<Tried> {
+        self.trail.take().unwrap_or_default()
+    }
+
     /// The manoeuvres found free in the last call, in the order they were tried.
     pub fn tried(&self) -> impl Iterator<Item = usize> + '_ {
         self.free.iter().map(|c| c.index())
@@ -296,7 +335,7 @@ impl LookUp<'_> {
         for index in order.iter().map(|index| *index as usize) {
             let candidate = Candidate::new(self.search.estimates[index], index);
             if candidate.estimate() < bound
-                && self.verdicts.is_free(self.library, index, self.problem, self.end)
+                && self.is_free(candidate)
                 && let Some((word, cost)) = self.joint(candidate, bound)
             {
                 bound = cost;
@@ -317,7 +356,7 @@ impl LookUp<'_> {
             if candidate.estimate() >= bound {
                 break;
             }
-            if self.verdicts.is_free(self.library, candidate.index(), self.problem, self.end)
+            if self.is_free(candidate)
                 && let Some((_, cost)) = self.joint(candidate, bound)
             {
                 bound = bound.min(times * cost);
@@ -351,7 +390,7 @@ impl LookUp<'_> {
                 return None;
             }
             self.search.queue.pop();
-            if self.verdicts.is_free(self.library, candidate.index(), self.problem, self.end) {
+            if self.is_free(candidate) {
                 self.search.free.push(candidate);
                 let window = candidate.window(self.library, self.model);
                 let plan = self.join(candidate, bound.min(window));
@@ -400,6 +439,24 @@ impl LookUp<'_> {
         })
     }
 
+    /// Whether driving a manoeuvre to its end touches nothing.
+    fn is_free(&mut self, candidate: Candidate) -> bool {
+        let index = candidate.index();
+        let free = self.verdicts.is_free(self.library, index, self.problem, self.end);
+        if !free {
+            self.note(candidate, || Fate::Touches);
+        }
+        free
+    }
+
+    /// Tells what came of a manoeuvre, where somebody asked.
+    fn note(&mut self, candidate: Candidate, fate: impl FnOnce() -> Fate) {
+        let Some(trail) = &mut self.search.trail else { return };
+        let entry = &self.library.manoeuvres[candidate.index()].entry;
+        let preparatory = self.end.compose(entry.pose);
+        trail.push(Tried { preparatory, motions: entry.rest.clone(), fate: fate() });
+    }
+
     /// The plan through a free manoeuvre, if a free curve joins it within `bound`.
     fn join(&mut self, candidate: Candidate, bound: f64) -> Option<LibraryPlan> {
         let (word, cost) = self.joint(candidate, bound)?;
@@ -413,15 +470,16 @@ impl LookUp<'_> {
         let entry = &library.manoeuvres[candidate.index()].entry;
         let preparatory = end.compose(entry.pose);
         let (departure, bound) = (entry.departure(), bound - entry.cost());
-        let (word, cost) = self.search.analytic.curve(
-            problem.start,
-            preparatory,
-            departure,
-            bound,
-            problem,
-            model,
-        )?;
-        Some((word, cost + entry.cost()))
+        let joint = self
+            .search
+            .analytic
+            .curve(problem.start, preparatory, departure, bound, problem, model)
+            .map(|(word, cost)| (word, cost + entry.cost()));
+        self.note(candidate, || match &joint {
+            Some((word, cost)) => Fate::Joined { curve: word.segments().to_vec(), cost: *cost },
+            None => Fate::NotJoined,
+        });
+        joint
     }
 
     /// The plan by a curve and the manoeuvre that it joins.

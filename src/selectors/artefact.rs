@@ -234,7 +234,8 @@ pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>, ArtefactError> {
 /// Opens a model file, refusing missing ones.
 pub(crate) fn open(path: &Path) -> Result<File, ArtefactError> {
     File::open(path).map_err(|e| match e.kind() {
-        ErrorKind::NotFound => Fault::Missing.of(path),
+        // A browser has no files at all.
+        ErrorKind::NotFound | ErrorKind::Unsupported => Fault::Missing.of(path),
         _ => Fault::Unreadable(e).of(path),
     })
 }
