@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::Parser;
-use n3p::cli::{self, BadInput, CostArgs, OrBadInput, PolicyArgs, TermsArgs};
+use n3p::cli::{self, BadInput, CostArgs, MapArgs, OrBadInput, PolicyArgs, TermsArgs};
 use n3p::curves::TrajectoryLimits;
 use n3p::curves::smoothing::StandstillSteering;
 use n3p::curves::trajectory::TrajectoryReport;
@@ -22,6 +22,7 @@ use n3p::planners::goals::{self, PassedOver, Terms};
 use n3p::planners::{Budget, Effort, NoPath, Problem, ProblemError};
 use n3p::vehicle::Vehicle;
 use n3p::world::Scene;
+use n3p::world::maps::Geographic;
 
 /// Plans a path for one parking scene.
 ///
@@ -30,8 +31,12 @@ use n3p::world::Scene;
 #[command(version)]
 struct Args {
     /// The scene, .json or TPCAP .csv.
-    #[arg(long, value_name = "FILE", required_unless_present = "list_models")]
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["list_models", "map"])]
     scene: Option<PathBuf>,
+    /// A map instead: an occupancy grid (.yaml), points (.csv, .pcd), .geojson, CommonRoad (.xml), OpenDRIVE
+    /// (.xodr), or a scene.
+    #[arg(long, value_name = "FILE", conflicts_with = "scene")]
+    map: Option<PathBuf>,
     /// List the models there are, for which vehicles, and from where; then stop.
     #[arg(long = "models")]
     list_models: bool,
@@ -74,6 +79,8 @@ struct Args {
     effort: Effort,
     #[command(flatten)]
     limits: Limits,
+    #[command(flatten)]
+    maps: MapArgs,
 }
 
 /// Limits of the trajectory; those of speed are the scene's.
@@ -117,6 +124,22 @@ fn steer_rate(text: &str) -> std::result::Result<f64, String> {
 }
 
 impl Args {
+    /// The file, the scene that it is or, with what else is given, becomes, and where on Earth that lies.
+    fn scene(&self) -> Result<(&Path, Scene, Option<Geographic>)> {
+        let Some(file) = self.map.as_deref() else {
+            let file = self.scene.as_deref().expect("clap asks for it");
+            if self.maps.is_given() {
+                let text =
+                    "--start, --goal, --vehicle: --scene has all of them; give --map FILE instead";
+                return Err(BadInput(text.to_owned()).into());
+            }
+            return Ok((file, Scene::read(file).or_bad_input()?, None));
+        };
+        let map = self.maps.read(file)?;
+        let scene = map.scene(&self.maps.request()?).or_bad_input()?;
+        Ok((file, scene, map.geographic))
+    }
+
     /// Where the wheels may turn at standstill: as told, else as little as need be where the path is to be
     /// driven.
     fn standstill(&self) -> StandstillSteering {
@@ -160,8 +183,7 @@ fn plan(args: &Args) -> Result<ExitCode> {
     if args.list_models {
         return list_models(args.json);
     }
-    let file = args.scene.as_deref().expect("clap asks for it");
-    let scene = Scene::read(file).or_bad_input()?;
+    let (file, scene, _on_earth) = args.scene()?;
     let file = file.display();
     let terms = args.terms.terms();
     let problem = goals::first_problem(&scene, terms).map_err(|e| {
