@@ -3,6 +3,8 @@
 //! Exit codes: 0 done, 1 our bug or I/O, 2 bad input or usage, 3 no path. Errors go to
 //! stderr in one or two plain lines.
 
+#[cfg(feature = "scene")]
+pub mod map_commands;
 mod maps;
 
 use std::fmt::Display;

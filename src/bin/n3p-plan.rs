@@ -53,14 +53,14 @@ struct Args {
     terms: TermsArgs,
     #[command(flatten)]
     cost: CostArgs,
-    /// Write the path to this JSON file.
+    /// Write the path to this .json, .csv or .geojson file.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Draw scene and path to this SVG file.
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
-    /// Write the trajectory, the path in time, to this .csv or .json file, or as poses and twists to
-    /// this .ros.json file. The steering is continuous then, as with --standstill-steering at-changes,
+    /// Write the trajectory, the path in time, to this .csv, .json or .geojson file, as poses and twists to
+    /// this .ros.json file, or as a recording for viewers, with the scene, to this .mcap file. The steering is continuous then, as with --standstill-steering at-changes,
     /// where such a path is found; else the car stops to steer.
     #[arg(long, value_name = "FILE", value_parser = TrajectoryFile::file_name)]
     trajectory: Option<PathBuf>,
@@ -183,7 +183,7 @@ fn plan(args: &Args) -> Result<ExitCode> {
     if args.list_models {
         return list_models(args.json);
     }
-    let (file, scene, _on_earth) = args.scene()?;
+    let (file, scene, on_earth) = args.scene()?;
     let file = file.display();
     let terms = args.terms.terms();
     let problem = goals::first_problem(&scene, terms).map_err(|e| {
@@ -234,7 +234,7 @@ fn plan(args: &Args) -> Result<ExitCode> {
     let scene = whole.with_goal(whole.all_goals()[episode.goal_index]);
 
     if let (Some(out), Some(path)) = (&args.out, &episode.path) {
-        path.write(out).or_bad_input()?;
+        path.write_as(out, on_earth).or_bad_input()?;
     }
     if let Some(svg) = &args.svg {
         let picture = picture(&whole, &scene, &episode, method, &models);
@@ -247,7 +247,7 @@ fn plan(args: &Args) -> Result<ExitCode> {
             let stop_to_steer = limits.stop_to_steer || stops;
             let limits = TrajectoryLimits { stop_to_steer, ..limits };
             let made = TrajectoryFile::new(&scene, frame, &path, method.name(), limits)?;
-            made.write(file).map_err(|e| unwritable(file, e))?;
+            made.write_with(file, &scene, on_earth).map_err(|e| unwritable(file, e))?;
             if let Some(svg) = &args.trajectory_svg {
                 let plot = trajectory_svg(&made);
                 write_whole(svg, plot.as_bytes()).map_err(|e| unwritable(svg, e))?;
@@ -449,6 +449,7 @@ fn picture(
         regions: n3p::episode::regions(episode, models),
         preparatory: preparatory.map(|p| frame.world_from_local(p)),
         note: Some(episode.row.reason.as_str()).filter(|r| !r.is_empty()),
+        ..Drawing::default()
     };
     scene_svg(scene, &drawing)
 }

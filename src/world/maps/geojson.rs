@@ -512,7 +512,7 @@ impl Spot {
     }
 
     /// Its corners, counter-clockwise.
-    pub(super) fn corners(&self) -> Vec<[f64; 2]> {
+    pub fn corners(&self) -> Vec<[f64; 2]> {
         let (x, y) = (self.length / 2.0, self.width / 2.0);
         let corners = [[-x, -y], [x, -y], [x, y], [-x, y]];
         corners

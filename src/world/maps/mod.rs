@@ -255,6 +255,23 @@ impl Map {
         Ok(scene)
     }
 
+    /// Puts what is asked for into the map.
+    pub fn add(&mut self, request: &MapRequest) {
+        if let Some(start) = request.start {
+            self.start = Some(Place::RearAxle(start));
+        }
+        if !request.goals.is_empty() {
+            self.goals = request.goals.iter().map(|&goal| Place::RearAxle(goal)).collect();
+        }
+        if let Some(vehicle) = request.vehicle {
+            // Another car has another outline.
+            if self.vehicle != Some(vehicle) {
+                self.contour.clear();
+            }
+            self.vehicle = Some(vehicle);
+        }
+    }
+
     /// The smallest box `[xmin, ymin, xmax, ymax]` around everything, spots, start and goals included; none around
     /// nothing.
     pub fn extent(&self) -> Option<[f64; 4]> {
