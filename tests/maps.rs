@@ -247,7 +247,7 @@ fn every_kind_of_map_is_planned_on() {
         "--start",
         "0,12,0",
         "--goal",
-        "12.05,0.3,1.5708",
+        "12.3,0.2,1.5708",
         "--vehicle",
         &tugger,
         "--trajectory",

@@ -167,7 +167,7 @@ impl Checked {
             } else {
                 let lacks = [
                     ("start", map.start.is_none()),
-                    ("goal", map.goals.is_empty()),
+                    ("goal", map.goals.is_empty() && map.spots.is_empty()),
                     ("vehicle", map.vehicle.is_none()),
                 ];
                 let lacks: Vec<&str> =
