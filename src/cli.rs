@@ -3,6 +3,10 @@
 //! Exit codes: 0 done, 1 our bug or I/O, 2 bad input or usage, 3 no path. Errors go to
 //! stderr in one or two plain lines.
 
+#[cfg(feature = "scene")]
+pub mod map_commands;
+mod maps;
+
 use std::fmt::Display;
 use std::io::{self, Write};
 use std::ops::RangeInclusive;
@@ -18,6 +22,8 @@ use crate::n3p::{Driver, MethodSettings, more};
 use crate::planners::cost::CostModel;
 use crate::planners::goals::Terms;
 use crate::planners::{HybridAStarConfig, Problem, Shape};
+
+pub use maps::{MapArgs, Unknown, vehicle};
 
 /// Exit code of a planner that found no path.
 pub const EXIT_NO_PATH: u8 = 3;

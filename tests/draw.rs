@@ -90,6 +90,7 @@ fn everything_at_once() {
         regions: Some(regions),
         preparatory: Some(Pose::new(3.0, 6.5, 0.4)),
         note: Some("a <remark> & more"),
+        ..Drawing::default()
     };
     let svg = scene_svg(&scene, &drawing);
     assert_well_formed(&svg);

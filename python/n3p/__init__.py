@@ -28,6 +28,7 @@ from n3p._n3p import (
     __version__,
     evaluate,
     generate,
+    load_map,
     load_scene,
 )
 from n3p.columns import Columns, Rows, Trajectory
@@ -48,5 +49,6 @@ __all__ = [
     "__version__",
     "evaluate",
     "generate",
+    "load_map",
     "load_scene",
 ]

@@ -233,6 +233,18 @@ class Environments:
     def reset(self, seed: int | None = None, only: list[bool] | None = None) -> Seen: ...
     def step(self, actions: ArrayLike) -> tuple[Seen, Told, list[tuple[int, Seen]]]: ...
 
+def load_map(
+    path: Path,
+    *,
+    start: ArrayLike | None = None,
+    goal: ArrayLike | None = None,
+    goals: ArrayLike | None = None,
+    vehicle: VehicleLike | None = None,
+    unknown: Literal["free", "occupied"] = "free",
+    heights: tuple[float, float] | None = None,
+    borders: bool = False,
+    metres: bool = False,
+) -> Scene: ...
 def load_scene(path: Path) -> Scene: ...
 def generate(
     type: ParkingType,

@@ -27,6 +27,7 @@ fn _n3p(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<parker::Parker>()?;
     m.add_class::<plan::Plan>()?;
     m.add_class::<environments::Environments>()?;
+    m.add_function(wrap_pyfunction!(scene::load_map, m)?)?;
     m.add_function(wrap_pyfunction!(scene::load_scene, m)?)?;
     m.add_function(wrap_pyfunction!(scene::generate, m)?)?;
     m.add_function(wrap_pyfunction!(evaluate::evaluate, m)?)

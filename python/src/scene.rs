@@ -14,7 +14,7 @@ use serde_json::Value;
 use n3p::geometry::Pose;
 use n3p::world;
 use n3p::world::generate::GeneratorConfig;
-use n3p::world::{Level, ParkingType};
+use n3p::world::{Level, Map, MapOptions, MapRequest, ParkingType};
 
 use crate::errors::{Fault, guarded};
 use crate::inputs::{self, LotArguments, RequestArguments, text};
@@ -187,6 +187,89 @@ pub fn load_scene(path: &Bound<'_, PyAny>) -> Result<Scene, Fault> {
         return Err(Fault::bad("path: expected text or an os.PathLike"));
     };
     Ok(Scene::new_from(world::Scene::read(&path).map_err(Fault::bad)?, None))
+}
+
+/// Reads a map of any kind (docs/formats.md) and makes it a scene.
+///
+/// Occupancy grids (``.yaml``), points (``.csv``, ``.pcd``), ``.geojson``, CommonRoad (``.xml``), OpenDRIVE
+/// (``.xodr``) and scenes.
+///
+/// Parameters
+/// ----------
+/// path : str or os.PathLike
+/// start : array_like, shape (3,), optional
+///     Pose to start from; the map's where it is left out.
+/// goal : array_like, shape (3,), optional
+///     Pose to park at; the map's, or both ways into its parking spaces.
+/// goals : array_like, shape (N, 3), optional
+///     Instead of ``goal``: poses of which the cheapest is taken.
+/// vehicle : Vehicle or dict, optional
+///     The car; the map's where it is left out, else the default one.
+/// unknown : {"free", "occupied"}
+///     What cells of an occupancy grid are of which nothing is known.
+/// heights : (float, float), optional
+///     Least and largest z of the points that count, metres.
+/// borders : bool
+///     Whether the borders of CommonRoad's lanelets are walls.
+/// metres : bool
+///     Whether coordinates of GeoJSON are metres, also where the file does not say so.
+///
+/// Returns
+/// -------
+/// Scene
+///
+/// Raises
+/// ------
+/// n3p.BadInput
+///     Says what is wrong with the file, and where, or what is missing.
+#[pyfunction]
+#[pyo3(signature = (path, *, start=None, goal=None, goals=None, vehicle=None, unknown="free", heights=None, borders=false, metres=false))]
+#[expect(clippy::too_many_arguments, reason = "they have names in Python")]
+pub fn load_map(
+    path: &Bound<'_, PyAny>,
+    start: Option<&Bound<'_, PyAny>>,
+    goal: Option<&Bound<'_, PyAny>>,
+    goals: Option<&Bound<'_, PyAny>>,
+    vehicle: Option<&Bound<'_, PyAny>>,
+    unknown: &str,
+    heights: Option<(f64, f64)>,
+    borders: bool,
+    metres: bool,
+) -> Result<Scene, Fault> {
+    let Some(path) = inputs::path(path) else {
+        return Err(Fault::bad("path: expected text or an os.PathLike"));
+    };
+    let unknown_is_occupied = match unknown {
+        "free" => false,
+        "occupied" => true,
+        other => {
+            let text = format!("unknown: is {other:?}; expected \"free\" or \"occupied\"");
+            return Err(Fault::bad(text));
+        }
+    };
+    let (low, high) = heights.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+    let options = MapOptions { unknown_is_occupied, heights: [low, high], borders, metres };
+    let pose = |object: &Bound<'_, PyAny>, name| {
+        inputs::numbers::<3>(object).map(Pose::from).map_err(|w| w.of(name))
+    };
+    let goals = match (goal, goals) {
+        (Some(goal), None) => vec![pose(goal, "goal")?],
+        (None, Some(goals)) => {
+            let rows = inputs::rows::<3>(goals).map_err(|w| w.of("goals"))?;
+            rows.into_iter().map(Into::into).collect()
+        }
+        (None, None) => Vec::new(),
+        (Some(_), Some(_)) => return Err(Fault::bad("goal and goals: give one of them")),
+    };
+    let start = start.map(|start| pose(start, "start")).transpose()?;
+    let map = Map::read_with(&path, &options).map_err(Fault::bad)?;
+    // Without one anywhere the car is the default one, as everywhere in this package.
+    let vehicle = match (vehicle, map.vehicle) {
+        (None, Some(_)) => None,
+        (given, _) => Some(self::vehicle(given)?),
+    };
+    let scene = map.scene(&MapRequest { start, goals, vehicle }).map_err(Fault::bad)?;
+    Ok(Scene::new_from(scene, None))
 }
 
 /// Makes scenes as in the paper's evaluation; the same arguments give the same scenes, and those of

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::Parser;
-use n3p::cli::{self, BadInput, CostArgs, OrBadInput, PolicyArgs, TermsArgs};
+use n3p::cli::{self, BadInput, CostArgs, MapArgs, OrBadInput, PolicyArgs, TermsArgs};
 use n3p::curves::TrajectoryLimits;
 use n3p::curves::smoothing::StandstillSteering;
 use n3p::curves::trajectory::TrajectoryReport;
@@ -22,6 +22,7 @@ use n3p::planners::goals::{self, PassedOver, Terms};
 use n3p::planners::{Budget, Effort, NoPath, Problem, ProblemError};
 use n3p::vehicle::Vehicle;
 use n3p::world::Scene;
+use n3p::world::maps::Geographic;
 
 /// Plans a path for one parking scene.
 ///
@@ -30,8 +31,12 @@ use n3p::world::Scene;
 #[command(version)]
 struct Args {
     /// The scene, .json or TPCAP .csv.
-    #[arg(long, value_name = "FILE", required_unless_present = "list_models")]
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["list_models", "map"])]
     scene: Option<PathBuf>,
+    /// A map instead: an occupancy grid (.yaml), points (.csv, .pcd), .geojson, CommonRoad (.xml), OpenDRIVE
+    /// (.xodr), or a scene.
+    #[arg(long, value_name = "FILE", conflicts_with = "scene")]
+    map: Option<PathBuf>,
     /// List the models there are, for which vehicles, and from where; then stop.
     #[arg(long = "models")]
     list_models: bool,
@@ -48,14 +53,14 @@ struct Args {
     terms: TermsArgs,
     #[command(flatten)]
     cost: CostArgs,
-    /// Write the path to this JSON file.
+    /// Write the path to this .json, .csv or .geojson file.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Draw scene and path to this SVG file.
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
-    /// Write the trajectory, the path in time, to this .csv or .json file, or as poses and twists to
-    /// this .ros.json file. The steering is continuous then, as with --standstill-steering at-changes,
+    /// Write the trajectory, the path in time, to this .csv, .json or .geojson file, as poses and twists to
+    /// this .ros.json file, or as a recording for viewers, with the scene, to this .mcap file. The steering is continuous then, as with --standstill-steering at-changes,
     /// where such a path is found; else the car stops to steer.
     #[arg(long, value_name = "FILE", value_parser = TrajectoryFile::file_name)]
     trajectory: Option<PathBuf>,
@@ -74,6 +79,8 @@ struct Args {
     effort: Effort,
     #[command(flatten)]
     limits: Limits,
+    #[command(flatten)]
+    maps: MapArgs,
 }
 
 /// Limits of the trajectory; those of speed are the scene's.
@@ -117,6 +124,22 @@ fn steer_rate(text: &str) -> std::result::Result<f64, String> {
 }
 
 impl Args {
+    /// The file, the scene that it is or, with what else is given, becomes, and where on Earth that lies.
+    fn scene(&self) -> Result<(&Path, Scene, Option<Geographic>)> {
+        let Some(file) = self.map.as_deref() else {
+            let file = self.scene.as_deref().expect("clap asks for it");
+            if self.maps.is_given() {
+                let text =
+                    "--start, --goal, --vehicle: --scene has all of them; give --map FILE instead";
+                return Err(BadInput(text.to_owned()).into());
+            }
+            return Ok((file, Scene::read(file).or_bad_input()?, None));
+        };
+        let map = self.maps.read(file)?;
+        let scene = map.scene(&self.maps.request()?).or_bad_input()?;
+        Ok((file, scene, map.geographic))
+    }
+
     /// Where the wheels may turn at standstill: as told, else as little as need be where the path is to be
     /// driven.
     fn standstill(&self) -> StandstillSteering {
@@ -160,8 +183,7 @@ fn plan(args: &Args) -> Result<ExitCode> {
     if args.list_models {
         return list_models(args.json);
     }
-    let file = args.scene.as_deref().expect("clap asks for it");
-    let scene = Scene::read(file).or_bad_input()?;
+    let (file, scene, on_earth) = args.scene()?;
     let file = file.display();
     let terms = args.terms.terms();
     let problem = goals::first_problem(&scene, terms).map_err(|e| {
@@ -212,7 +234,7 @@ fn plan(args: &Args) -> Result<ExitCode> {
     let scene = whole.with_goal(whole.all_goals()[episode.goal_index]);
 
     if let (Some(out), Some(path)) = (&args.out, &episode.path) {
-        path.write(out).or_bad_input()?;
+        path.write_as(out, on_earth).or_bad_input()?;
     }
     if let Some(svg) = &args.svg {
         let picture = picture(&whole, &scene, &episode, method, &models);
@@ -225,7 +247,7 @@ fn plan(args: &Args) -> Result<ExitCode> {
             let stop_to_steer = limits.stop_to_steer || stops;
             let limits = TrajectoryLimits { stop_to_steer, ..limits };
             let made = TrajectoryFile::new(&scene, frame, &path, method.name(), limits)?;
-            made.write(file).map_err(|e| unwritable(file, e))?;
+            made.write_with(file, &scene, on_earth).map_err(|e| unwritable(file, e))?;
             if let Some(svg) = &args.trajectory_svg {
                 let plot = trajectory_svg(&made);
                 write_whole(svg, plot.as_bytes()).map_err(|e| unwritable(svg, e))?;
@@ -427,6 +449,7 @@ fn picture(
         regions: n3p::episode::regions(episode, models),
         preparatory: preparatory.map(|p| frame.world_from_local(p)),
         note: Some(episode.row.reason.as_str()).filter(|r| !r.is_empty()),
+        ..Drawing::default()
     };
     scene_svg(scene, &drawing)
 }

@@ -1,4 +1,4 @@
-//! Scenes: files of generated ones.
+//! Scenes and maps: generated ones, and what others made.
 
 use std::collections::HashSet;
 use std::fs;
@@ -7,6 +7,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use n3p::cli::map_commands::{Checked, Listed, Written};
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::files::{reason, remove_leftovers};
 use n3p::vehicle::Vehicle;
@@ -16,7 +17,7 @@ use n3p::world::generate::{GeneratorConfig, generate, some_wide};
 use n3p::world::lots::lot;
 use n3p::world::{Level, ParkingType, Scene};
 
-/// Makes files of scenes.
+/// Makes files of scenes, and reads maps.
 #[derive(Parser)]
 #[command(version)]
 struct Cli {
@@ -28,6 +29,14 @@ struct Cli {
 enum Command {
     /// Writes generated scenes, a function of the arguments alone, as files NAME.json.
     Generate(Generate),
+    /// Writes a map as a scene (.json) or as GeoJSON (.geojson).
+    Convert(Written),
+    /// Reads maps and says what they hold; of scenes also whether start and goals are free.
+    Check(Checked),
+    /// Draws a map as SVG.
+    Draw(Written),
+    /// Lists the parking spaces of a map that are free, each with the goals to give.
+    Spots(Listed),
 }
 
 #[derive(Args)]
@@ -75,6 +84,10 @@ const MAX_COUNT: i64 = 100_000;
 fn main() -> ExitCode {
     cli::run(|| match cli::parse::<Cli>().command {
         Command::Generate(args) => write(&args),
+        Command::Convert(args) => args.convert(),
+        Command::Check(args) => args.check(),
+        Command::Draw(args) => args.draw(),
+        Command::Spots(args) => args.list(),
     })
 }
 

@@ -25,6 +25,10 @@ pub struct Drawing<'a> {
     pub other_goals: Vec<Pose>,
     /// One more remark for the title, such as why there is no path.
     pub note: Option<&'a str>,
+    /// Marked places to park in.
+    pub spots: Vec<Polygon>,
+    /// Whether the scene is a place alone, without start and goal.
+    pub is_place_alone: bool,
 }
 
 /// Width of the picture, px.
@@ -121,7 +125,11 @@ fn view(scene: &Scene, drawing: &Drawing) -> Aabb {
         drawing.path.into_iter().flat_map(|p| p.sample(STEP)).flat_map(|s| corners(s.pose)),
     );
     shown.extend(drawing.regions.iter().flatten().flat_map(|r| r.vertices().to_vec()));
-    let view = if drawing.path.is_some() {
+    let view = if drawing.is_place_alone {
+        let spots = drawing.spots.iter().flat_map(|spot| spot.vertices().to_vec());
+        let outlines: Vec<Outline> = scene.outlines().collect();
+        Aabb::around(outlines.iter().flat_map(Outline::points).chain(spots)).inflated(PADDING)
+    } else if drawing.path.is_some() {
         Aabb::around(shown).inflated(PADDING)
     } else {
         let near = Aabb::around(shown.iter().copied()).inflated(PADDING_ALONE);
@@ -165,6 +173,13 @@ impl Map {
                 Shape::Chain => self.line(&vertices, line),
                 Shape::Border => self.polygon(&vertices, &format!("fill=\"none\" {line}")),
             }
+        }
+        for spot in &drawing.spots {
+            self.polygon(spot.vertices(), SPOT);
+        }
+        if drawing.is_place_alone {
+            self.scale_bar();
+            return;
         }
         if let Some(path) = drawing.path {
             self.footprints(path, vehicle);
@@ -313,6 +328,9 @@ fn legend(scene: &Scene, drawing: &Drawing) -> Vec<Entry> {
     let dot = |style: &str| format!(r#"<circle cx="13" cy="7" r="4.5" {style}/>"#);
 
     let mut entries = vec![(car(START, ""), "start"), (car(GOAL, ""), "goal")];
+    if drawing.is_place_alone {
+        entries.clear();
+    }
     if !drawing.other_goals.is_empty() {
         entries.push((area(OTHER_GOAL), "other goals"));
     }
@@ -334,7 +352,10 @@ fn legend(scene: &Scene, drawing: &Drawing) -> Vec<Entry> {
         }
     }
     if drawing.regions.is_some() {
-        entries.extend([(area(LANE), "lane"), (area(SPOT), "spot")]);
+        entries.push((area(LANE), "lane"));
+    }
+    if drawing.regions.is_some() || !drawing.spots.is_empty() {
+        entries.push((area(SPOT), "spot"));
     }
     for (style, what, is_low) in [(HIGH[0], "obstacle", false), (LOW[0], "low: wheels only", true)]
     {

@@ -14,6 +14,7 @@ use crate::files::{reason, write_whole};
 use crate::geometry::{Frame, Pose, Vec2, signed_angle};
 use crate::vehicle::Vehicle;
 use crate::world::Scene;
+use crate::world::maps::Geographic;
 
 /// A planned path, as exported.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -136,12 +137,46 @@ impl PathFile {
         serde_json::to_string(self).expect("plain numbers and strings")
     }
 
+    /// The path as a table: a line of names with units, and one for each pose.
+    pub fn to_csv(&self) -> String {
+        let changes = self.steer_from.as_ref().zip(self.steer_to.as_ref());
+        let more = if changes.is_some() { ",steer_from_rad,steer_to_rad" } else { "" };
+        let mut text = format!("x_m,y_m,heading_rad,gear,steer_rad{more}\n");
+        for (i, [x, y, heading]) in self.poses.iter().enumerate() {
+            let more = changes.map(|(from, to)| format!(",{},{}", from[i], to[i]));
+            let (gear, steer, more) = (self.gears[i], self.steer[i], more.unwrap_or_default());
+            text += &format!("{x},{y},{heading},{gear},{steer}{more}\n");
+        }
+        text
+    }
+
+    /// Writes a table where the name ends in `.csv`, lines on a map where it ends in `.geojson` (`on_earth` is
+    /// where the scene's frame lies), else JSON.
+    pub fn write_as(
+        &self,
+        file: &FilePath,
+        on_earth: Option<Geographic>,
+    ) -> Result<(), PathFileError> {
+        let text = match (has_ending(file, "csv"), has_ending(file, "geojson")) {
+            (true, _) => self.to_csv(),
+            (_, true) => self.to_geojson(on_earth),
+            _ => self.to_json(),
+        };
+        let error = |error| PathFileError::Io { path: file.to_owned(), error };
+        write_whole(file, text.as_bytes()).map_err(error)
+    }
+
     /// Writes the file (to a temporary name, then renamed).
     pub fn write(&self, file: &FilePath) -> Result<(), PathFileError> {
         let json = self.to_json();
         write_whole(file, json.as_bytes())
             .map_err(|error| PathFileError::Io { path: file.to_owned(), error })
     }
+}
+
+/// Whether a file's name ends so.
+pub(super) fn has_ending(file: &FilePath, ending: &str) -> bool {
+    file.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
 }
 
 /// `exact`, where `pose` is as near as rounding leaves it; else `pose`.

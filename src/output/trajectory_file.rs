@@ -10,13 +10,15 @@ use std::path::{Path as FilePath, PathBuf};
 use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
 
-use super::path_file::{Near, snap};
+use super::path_file::{Near, has_ending, snap};
+use super::recording;
 use crate::curves::trajectory::{LimitError, Moment, TrajectoryReport};
 use crate::curves::{SmoothPath, Trajectory, TrajectoryLimits};
 use crate::files::write_whole;
 use crate::geometry::{Frame, Pose};
 use crate::vehicle::Vehicle;
 use crate::world::Scene;
+use crate::world::maps::Geographic;
 
 /// A planned trajectory, as exported.
 #[derive(Clone, Debug, Serialize)]
@@ -106,8 +108,10 @@ impl TrajectoryFile {
     /// A name that [`TrajectoryFile::write`] takes, from the command line.
     pub fn file_name(text: &str) -> Result<PathBuf, String> {
         let file = PathBuf::from(text);
-        let known = has_ending(&file, "csv") || has_ending(&file, "json");
-        known.then_some(file).ok_or_else(|| "expected a name ending in .csv or .json".to_owned())
+        let endings = ["csv", "json", "geojson", "mcap"];
+        let known = endings.iter().any(|ending| has_ending(&file, ending));
+        let expected = "expected a name ending in .csv, .json, .geojson or .mcap";
+        known.then_some(file).ok_or_else(|| expected.to_owned())
     }
 
     /// Writes CSV where the name ends in `.csv`, poses and twists where it ends in `.ros.json`, else JSON (to a
@@ -120,6 +124,21 @@ impl TrajectoryFile {
             false => self.to_json(),
         };
         write_whole(file, text.as_bytes())
+    }
+
+    /// As [`TrajectoryFile::write`], and lines on a map where the name ends in `.geojson` (`on_earth` is where the
+    /// scene's frame lies), a recording for viewers where it ends in `.mcap`.
+    pub fn write_with(
+        &self,
+        file: &FilePath,
+        scene: &Scene,
+        on_earth: Option<Geographic>,
+    ) -> io::Result<()> {
+        match (has_ending(file, "mcap"), has_ending(file, "geojson")) {
+            (true, _) => write_whole(file, &recording(scene, self)),
+            (_, true) => write_whole(file, self.to_geojson(on_earth).as_bytes()),
+            _ => self.write(file),
+        }
     }
 
     fn to_csv(&self) -> String {
@@ -160,10 +179,6 @@ impl TrajectoryFile {
     fn to_json(&self) -> String {
         serde_json::to_string(self).expect("plain numbers and strings")
     }
-}
-
-fn has_ending(file: &FilePath, ending: &str) -> bool {
-    file.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
 }
 
 /// The moments as one array per column.

@@ -353,7 +353,7 @@ impl Scene {
 
     /// A warning where headings look like degrees: no scene needs whole turns, and no heading in
     /// radians is a whole or half number by chance.
-    fn degrees(&self) -> Option<String> {
+    pub(super) fn degrees(&self) -> Option<String> {
         let is_suspect = |h: f64| {
             let halves = 2.0 * h;
             h.abs() > TAU * 1.0001 && (halves - halves.round()).abs() < 1e-6
