@@ -179,6 +179,12 @@ impl Models {
         &mut self.vehicles[at]
     }
 
+    /// The same with one more selector of preparatory poses.
+    pub fn with_selector(mut self, model: Model) -> Result<Self, ModelsError> {
+        self.add_selector(model)?;
+        Ok(self)
+    }
+
     /// The same with a policy from outside.
     pub fn with_policy(self, outside: Option<Arc<dyn Driver>>) -> Self {
         Self { outside, ..self }

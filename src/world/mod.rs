@@ -20,6 +20,7 @@ mod kind;
 #[cfg(any(test, feature = "generate"))]
 pub mod lots;
 mod obstacles;
+mod placed;
 pub mod scene;
 mod scene_file;
 pub mod spot;
