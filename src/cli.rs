@@ -182,7 +182,7 @@ impl CostArgs {
 }
 
 /// A driving policy from outside.
-#[derive(clap::Args)]
+#[derive(Debug, clap::Args)]
 pub struct PolicyArgs {
     /// A driving policy from outside, the method "policy": an .onnx file, or the command of a
     /// program (see docs/policies.md).

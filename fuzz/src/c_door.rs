@@ -103,13 +103,13 @@ impl Calls<'_> {
                 }
                 7 => {
                     let at = self.pose()?;
-                    let cells = some(&mut self.u, 64, u8::arbitrary)?;
+                    let cells = some(&mut self.u, 64, |u| u8::arbitrary(u))?;
                     let columns = usize::from(u8::arbitrary(&mut self.u)? % 9);
                     let rows = cells.len().checked_div(columns).unwrap_or(0);
                     n3p_lot_grid(self.handle()?, at.x, at.y, at.heading, columns, rows, cells.as_ptr())
                 }
                 8 => {
-                    let text = some(&mut self.u, 200, u8::arbitrary)?;
+                    let text = some(&mut self.u, 200, |u| u8::arbitrary(u))?;
                     let mut scene = ptr::null_mut();
                     let status = n3p_scene_from_json(text.as_ptr().cast(), text.len(), &mut scene);
                     self.keep(status, scene);

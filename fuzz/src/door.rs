@@ -1,5 +1,7 @@
 //! The Rust door with any numbers at all: an error or a plan, never a panic.
 
+use std::sync::OnceLock;
+
 use arbitrary::{Arbitrary, Result, Unstructured};
 use n3p::curves::TrajectoryLimits;
 use n3p::curves::smoothing::StandstillSteering;
@@ -62,7 +64,7 @@ fn lot(u: &mut Unstructured) -> Result<Lot> {
     }
     if u8::arbitrary(u)? % 4 == 0 {
         let (origin, resolution) = (point(u)?, number(u)?);
-        let (columns, cells) = (usize::from(u8::arbitrary(u)? % 8), some(u, 40, bool::arbitrary)?);
+        let (columns, cells) = (usize::from(u8::arbitrary(u)? % 8), some(u, 40, |u| bool::arbitrary(u))?);
         lot.grid(origin, resolution, columns, &cells);
     }
     Ok(lot)
@@ -86,9 +88,11 @@ fn tried(u: &mut Unstructured) -> Result<()> {
         parking_type: Some(*u.choose(&ParkingType::ALL)?).filter(|_| data_is_even(u)),
     };
     let method = if u8::arbitrary(u)? % 8 == 0 { Method::N3P } else { Method::HA_RS };
-    let models = match method {
-        Method::N3P if vehicle == Vehicle::default() => Models::compiled_in(&vehicle).expect("whole"),
-        _ => Models::default(),
+    let models = if method == Method::N3P && vehicle == Vehicle::default() {
+        static MODELS: OnceLock<Models> = OnceLock::new();
+        MODELS.get_or_init(|| Models::compiled_in(&Vehicle::default()).expect("whole")).clone()
+    } else {
+        Models::default()
     };
     let method = if models.selector(Method::N3P, &vehicle).is_some() { method } else { Method::HA_RS };
     let Ok(mut parker) = Parker::by(method, vehicle, models) else { return Ok(()) };

@@ -65,8 +65,8 @@ pub(crate) fn mended(data: &[u8]) -> Option<Vec<u8>> {
     Some([&(header.len() as u64).to_le_bytes(), &header[..], tensors].concat())
 }
 
-/// One of the models compiled in, with bytes of it changed: which one, then where (three bytes), which of
-/// its parts, and what.
+/// One of the models compiled in, with bytes of it changed: which one, then for each change where (three
+/// bytes), in which of its parts, and to what.
 pub fn patched_model(data: &[u8]) {
     let Some((&which, patches)) = data.split_first() else { return };
     // The largest takes too long for each of many tries.
@@ -99,7 +99,7 @@ pub fn patched_model(data: &[u8]) {
         }
     }
     if let Some(selector) = try_model(whole) {
-        plan_by(selector);
+        plan_by(selector, patches.len());
     }
 }
 
@@ -134,7 +134,7 @@ fn ask(selector: &dyn PoseSelector, kinds: &[ParkingType], vehicle: &Vehicle) {
 }
 
 /// A plan by a wrong model may be a bad one, and is checked all the same.
-fn plan_by(model: Model) {
+fn plan_by(model: Model, which: usize) {
     static SCENES: OnceLock<Vec<Scene>> = OnceLock::new();
     let vehicle = model.vehicle().copied().unwrap_or_default();
     let scenes = SCENES.get_or_init(|| {
@@ -144,17 +144,14 @@ fn plan_by(model: Model) {
     });
     let Ok(models) = Models::default().with_selector(model) else { return };
     let Ok(mut planner) = Method::N3P.build(&models, &Default::default()) else { return };
-    for scene in scenes {
-        let scene = Scene { vehicle, ..scene.clone() };
-        if models.check_vehicle(Method::N3P, "fuzz", &vehicle).is_err() {
-            return;
-        }
+    if models.check_vehicle(Method::N3P, "fuzz", &vehicle).is_ok() {
+        let scene = Scene { vehicle, ..scenes[which % scenes.len()].clone() };
         checked(planner.as_mut(), &scene);
     }
 }
 
 fn checked(planner: &mut dyn Planner, scene: &Scene) {
-    let budget = Budget::new(300);
+    let budget = Budget::new(100);
     let Ok(planned) = goals::plan(planner, scene, Terms::default(), budget) else { return };
     if let Some(driven) = planned.result.driven() {
         check::path(scene, &planned.problem.frame, &driven, 0.0);

@@ -104,3 +104,27 @@ fn tried(planner: &mut dyn Planner, asked: &Asked) {
         assert!(moments.last().is_none_or(|m| m.speed.abs() < 1e-6), "it does not stand at the end");
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Inputs of the fuzzer are about something: most scenes have a path, by every method.
+    #[test]
+    fn most_scenes_are_planned() {
+        let mut planned = HashMap::<&str, [u32; 2]>::new();
+        for n in 0..300_u32 {
+            let bytes: Vec<u8> = (0..400).map(|i| (n * 7919 + i * i * 31 + i * n) as u8).collect();
+            let asked = Asked::arbitrary(&mut Unstructured::new(&bytes)).unwrap();
+            let found = with_planner(&asked, |planner| {
+                let planned = goals::plan(planner, &asked.scene, asked.terms, asked.budget);
+                planned.is_ok_and(|p| p.result.outcome.is_ok())
+            });
+            let count = planned.entry(asked.method).or_default();
+            count[0] += 1;
+            count[1] += u32::from(found == Some(true));
+        }
+        println!("{planned:?}");
+        assert!(planned.len() >= 4 && planned["n3p"][1] * 2 > planned["n3p"][0], "{planned:?}");
+    }
+}

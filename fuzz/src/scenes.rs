@@ -2,7 +2,7 @@
 
 use arbitrary::{Arbitrary, Result, Unstructured};
 use n3p::Vehicle;
-use n3p::geometry::{Frame, Pose, Vec2};
+use n3p::geometry::{Frame, Pose};
 use n3p::world::clutter::{VEHICLES, clutter};
 use n3p::world::generate::{GeneratorConfig, generate};
 use n3p::world::lots::lot;
@@ -80,31 +80,10 @@ fn obstacle(u: &mut Unstructured, scene: &mut Scene) -> Result<()> {
     Ok(())
 }
 
-/// The scene turned, moved as far as maps reach, perhaps mirrored. Bounds grow about what they held.
+/// The scene turned, moved as far as maps reach, perhaps mirrored.
 fn elsewhere(scene: &Scene, u: &mut Unstructured) -> Result<Scene> {
     let far = 10_f64.powi(i32::from(u8::arbitrary(u)? % 9));
     let origin_in_world = Pose::new(about(u, far)?, about(u, far)?, about(u, 3.2)?);
     let frame = Frame { origin_in_world, mirrored: bool::arbitrary(u)? };
-    Ok(placed(scene, &frame))
-}
-
-/// The same scene in another place.
-pub fn placed(scene: &Scene, frame: &Frame) -> Scene {
-    let point = |v: &[f64; 2]| -> [f64; 2] { frame.world_from_local_point(Vec2::new(v[0], v[1])).into() };
-    let pose = |p: Pose| frame.world_from_local(p);
-    Scene {
-        start: pose(scene.start),
-        goal: pose(scene.goal),
-        goals: scene.goals.iter().map(|&p| pose(p)).collect(),
-        obstacles: scene.obstacles.iter().map(|o| o.iter().map(point).collect()).collect(),
-        points: scene.points.iter().map(point).collect(),
-        bounds: scene.bounds.map(|[a, b, c, d]| {
-            let corners = [[a, b], [c, b], [c, d], [a, d]].map(|v| point(&v));
-            let of = |pick: fn(f64, f64) -> f64, k: usize| {
-                corners.iter().map(|c| c[k]).reduce(pick).expect("four corners")
-            };
-            [of(f64::min, 0), of(f64::min, 1), of(f64::max, 0), of(f64::max, 1)]
-        }),
-        ..scene.clone()
-    }
+    Ok(scene.placed(&frame))
 }

@@ -37,7 +37,7 @@ fn made_ready(scene: &Scene) {
         assert!(problem.start.is_finite() && problem.goal.is_finite(), "{scene:?}");
         let there = problem.frame.world_from_local(problem.start);
         let apart = there.distance(scene.start);
-        assert!(apart <= 1e-9 + 4.0 * scene.start.resolution(), "{apart} m from the start");
+        assert!(apart <= 1e-6 + 4.0 * scene.start.resolution(), "{apart} m from the start");
     }
 }
 

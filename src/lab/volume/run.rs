@@ -23,6 +23,7 @@ use crate::lab::progress;
 use crate::n3p::{Method, MethodError, MethodSettings, Models, ModelsError};
 use crate::output::PathFile;
 use crate::planners::Planner;
+use crate::vehicle::Vehicle;
 use crate::world::Scene;
 
 /// How a run goes about it; none of it changes what the records say.
@@ -125,10 +126,10 @@ impl Job<'_> {
         let next = AtomicUsize::new(0);
         let first_error = Mutex::new(None);
         let work = || {
-            let mut run = || -> Result<(), VolumeError> {
-                let mut planner = self.planner()?;
+            let run = || -> Result<(), VolumeError> {
+                let mut planners = Planners { job: self, of: Vec::new() };
                 while let Some(&shard) = todo.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    self.shard(shard, &mut planner)?;
+                    self.shard(shard, &mut planners)?;
                     bar.inc(1);
                 }
                 Ok(())
@@ -161,14 +162,14 @@ impl Job<'_> {
         Some(folder.join(format!("shard-{shard:06}.jsonl")))
     }
 
-    fn shard(&self, shard: u64, planner: &mut Box<dyn Planner + Send>) -> Result<(), VolumeError> {
+    fn shard(&self, shard: u64, planners: &mut Planners) -> Result<(), VolumeError> {
         let begun = Instant::now();
         let (mut results, mut times) = (Results::default(), Times::default());
         let mut samples = String::new();
         let first = shard * self.config.scenes_per_shard;
         for number in first..self.config.count.min(first + self.config.scenes_per_shard) {
             let sampled = self.options.samples.is_some() && number % self.options.sample_every == 0;
-            self.scene(number, planner, &mut results, &mut times, sampled.then_some(&mut samples))?;
+            self.scene(number, planners, &mut results, &mut times, sampled.then_some(&mut samples))?;
         }
         if let Some(path) = self.samples_path(shard) {
             write_whole(&path, samples.as_bytes()).map_err(failed(&path))?;
@@ -189,14 +190,15 @@ impl Job<'_> {
     fn scene(
         &self,
         number: u64,
-        planner: &mut Box<dyn Planner + Send>,
+        planners: &mut Planners,
         results: &mut Results,
         times: &mut Times,
         samples: Option<&mut String>,
     ) -> Result<(), VolumeError> {
         let case = draw(self.config, number);
         let once = EpisodeConfig { repeats: 0, ..EpisodeConfig::new(self.config.budget()) };
-        let plan = || episode::run(&case, planner.as_mut(), &once, &oracle::JUDGE);
+        let planner = planners.of(&case.scene.vehicle)?;
+        let plan = || episode::run(&case, planner, &once, &oracle::JUDGE);
         let failure = |what, reason| Failure { number, what, reason };
         match catch_unwind(AssertUnwindSafe(plan)) {
             Ok(Ok(episode)) => {
@@ -216,10 +218,30 @@ impl Job<'_> {
                 let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
                 let text = text.unwrap_or("a panic without words").to_owned();
                 results.fail(&case.set, failure(Outcome::Panicked, text));
-                *planner = self.planner()?;
+                planners.of.clear();
             }
         }
         Ok(())
+    }
+}
+
+/// A planner for each vehicle: what one makes ready for its vehicle is not made anew at every turn.
+struct Planners<'a> {
+    job: &'a Job<'a>,
+    of: Vec<(Vehicle, Box<dyn Planner + Send>)>,
+}
+
+impl Planners<'_> {
+    fn of(&mut self, vehicle: &Vehicle) -> Result<&mut dyn Planner, VolumeError> {
+        let known = self.of.iter().position(|(v, _)| v == vehicle);
+        let at = match known {
+            Some(at) => at,
+            None => {
+                self.of.push((*vehicle, self.job.planner()?));
+                self.of.len() - 1
+            }
+        };
+        Ok(self.of[at].1.as_mut())
     }
 }
 
