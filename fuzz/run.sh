@@ -7,6 +7,7 @@
 #   fuzz/run.sh TARGET SECONDS [...]  fuzzes one, from its corpus; what is found lies in target/found/
 #   fuzz/run.sh all SECONDS           each in turn
 #   fuzz/run.sh replay [TARGET]       runs the corpora once
+#   fuzz/run.sh seeds                 adds to the corpora what they began with
 #   fuzz/run.sh minimise TARGET       keeps of its corpus and of what it learnt what adds coverage
 #
 # N3P_FUZZ_LAB=1 adds the targets of the laboratory, which build for minutes. N3P_FUZZ_ASAN=1 builds with
@@ -40,7 +41,7 @@ names() {
 build() {
   # With --target the flags are those of the targets alone, not of build scripts.
   RUSTC_BOOTSTRAP=1 RUSTFLAGS="$flags" cargo build --release --locked --quiet --target "$triple" \
-    --target-dir "$target/$kind" "${features[@]}" $(names | sed 's/^/--bin /')
+    --target-dir "$target/$kind" "${features[@]}" $(names | sed 's/^/--bin /') "$@"
 }
 # A plan takes milliseconds; what takes ten seconds is a bug. Memory in megabytes.
 fuzz() {
@@ -57,13 +58,21 @@ case "${1:-}" in
   replay)
     for name in $(if [ -n "${2:-}" ]; then echo "$2"; else names; fi); do
       [ -x "$bin/$name" ] || build
-      echo "== $name"
-      fuzz "$name" -runs=0 "corpus/$name" 2>&1 | tail -n 20 | grep -v '^stat::\|^$' || true
-      "$bin/$name" -runs=0 -verbosity=0 -timeout=10 -rss_limit_mb=2048 "corpus/$name" >/dev/null 2>&1
+      log="$target/$name.log"
+      if fuzz "$name" -runs=0 "corpus/$name" >"$log" 2>&1; then
+        echo "$name: $(ls "corpus/$name" | wc -l) inputs"
+      else
+        grep -v NEW_FUNC "$log" | tail -n 40
+        exit 1
+      fi
     done
     ;;
   all)
     for name in $(names); do "$0" "$name" "${2:?seconds}"; done
+    ;;
+  seeds)
+    build --bin seeds
+    "$bin/seeds" >/dev/null 2>&1
     ;;
   minimise)
     name="${2:?a target}"

@@ -60,7 +60,7 @@ pub fn check_writable(path: &Path) -> io::Result<()> {
 /// A folder that is this process's until this is dropped or the process ends, however it does.
 #[derive(Debug)]
 #[must_use]
-pub struct Keeper(Option<File>);
+pub struct Keeper(#[expect(dead_code, reason = "it is held, not read")] Option<File>);
 
 /// Keeps `folder` for this process; [`ErrorKind::ResourceBusy`] where another process has it. Nothing is written,
 /// and where folders cannot be locked everybody may have it.

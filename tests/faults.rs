@@ -29,39 +29,91 @@ struct Task {
 const COLLECT: Task = Task {
     name: "collect",
     program: "n3p-collect",
-    arguments: &["--type", "reverse", "--config", "collect.toml", "--threads", "1", "--resume", "--out", "OUT"],
+    arguments: &[
+        "--type",
+        "reverse",
+        "--config",
+        "collect.toml",
+        "--threads",
+        "1",
+        "--resume",
+        "--out",
+        "OUT",
+    ],
 };
 const KNN: Task = Task {
     name: "train knn",
     program: "n3p-train",
-    arguments: &["knn", "--data", SMALL, "--type", "reverse", "--worlds", "5", "--out", "OUT/knn.bin"],
+    arguments: &[
+        "knn",
+        "--data",
+        "data",
+        "--type",
+        "reverse",
+        "--worlds",
+        "5",
+        "--out",
+        "OUT/knn.bin",
+    ],
 };
 const MLP: Task = Task {
     name: "train mlp",
     program: "n3p-train",
     arguments: &[
-        "mlp", "--data", SMALL, "--type", "reverse", "--set", "epochs=2", "--out", "OUT/mlp.safetensors",
+        "mlp",
+        "--data",
+        "data",
+        "--type",
+        "reverse",
+        "--set",
+        "epochs=2",
+        "--out",
+        "OUT/mlp.safetensors",
     ],
 };
 const FLEET: Task = Task {
     name: "train fleet",
     program: "n3p-train",
     arguments: &[
-        "fleet", "--data", SMALL, "--worlds", "3", "--set", "epochs=1", "--out", "OUT/fleet.safetensors",
+        "fleet",
+        "--data",
+        "data",
+        "--worlds",
+        "0",
+        "--set",
+        "epochs=1",
+        "--out",
+        "OUT/fleet.safetensors",
     ],
 };
 const RL: Task = Task {
     name: "train rl",
     program: "n3p-train",
     arguments: &[
-        "rl", "--env", "simple", "--config", "rl.toml", "--resume", "--out", "OUT/rl.safetensors",
+        "rl",
+        "--env",
+        "simple",
+        "--config",
+        "rl.toml",
+        "--resume",
+        "--out",
+        "OUT/rl.safetensors",
     ],
 };
 const EVAL: Task = Task {
     name: "eval",
     program: "n3p-eval",
     arguments: &[
-        "--methods", "ha,n3p", "--count", "4", "--drive", "--paths", "OUT/paths", "--resume", "--out", "OUT",
+        "--methods",
+        "ha,n3p",
+        "--count",
+        "4",
+        "--drive",
+        "--paths",
+        "OUT/paths",
+        "--resume",
+        "--out",
+        "OUT",
     ],
 };
 const EXPERIMENT: Task = Task {
@@ -75,8 +127,6 @@ const VOLUME: Task = Task {
     arguments: &["volume", "volume.toml", "--samples", "OUT/samples", "--out", "OUT"],
 };
 const ALL: [&Task; 8] = [&COLLECT, &KNN, &MLP, &FLEET, &RL, &EVAL, &EXPERIMENT, &VOLUME];
-
-const SMALL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/small");
 
 const COLLECT_TOML: &str = r#"
 samples_per_cell = 10
@@ -131,7 +181,8 @@ levels = ["easy"]
 count = 3
 seed = 11
 "#;
-const VOLUME_TOML: &str = "version = 1\nseed = 5\ncount = 60\nscenes_per_shard = 6\nmap_coordinates = 1e6\n";
+const VOLUME_TOML: &str =
+    "version = 1\nseed = 5\ncount = 60\nscenes_per_shard = 6\nmap_coordinates = 1e6\n";
 
 impl Task {
     /// The program, to write into `out`; its settings lie in `home`.
@@ -164,6 +215,17 @@ fn home() -> tempfile::TempDir {
         ("volume.toml", VOLUME_TOML),
     ];
     files.iter().for_each(|(name, text)| fs::write(home.path().join(name), text).unwrap());
+    // What trainings learn from, collected once.
+    static DATA: OnceLock<tempfile::TempDir> = OnceLock::new();
+    let data = DATA.get_or_init(|| {
+        let data = tempfile::tempdir().unwrap();
+        let mut command = Command::new(cargo_bin("n3p-collect"));
+        command.args(["--config", "collect.toml", "--out"]).arg(data.path().join("data"));
+        let output = command.current_dir(home.path()).output().unwrap();
+        assert!(output.status.success(), "{}", told(&output));
+        data
+    });
+    std::os::unix::fs::symlink(data.path().join("data"), home.path().join("data")).unwrap();
     home
 }
 
@@ -300,7 +362,11 @@ fn assert_told(task: &Task, what: &str, output: &Output) {
     let code = output.status.code();
     assert!(matches!(code, Some(1 | 2)), "{}, {what}: {code:?} {text}", task.name);
     let lines = text.lines().filter(|l| !l.trim().is_empty()).count();
-    assert!((1..=3).contains(&lines) && !text.contains("panicked"), "{}, {what}: {text}", task.name);
+    assert!(
+        (1..=3).contains(&lines) && !text.contains("panicked"),
+        "{}, {what}: {text}",
+        task.name
+    );
 }
 
 /// A disk that is full after so many blocks of 512 bytes.
@@ -366,7 +432,9 @@ fn damaged_files_are_made_again_or_told() {
             let other = names[(i + 1) % names.len()];
             let bytes = fs::read(whole.join(name)).unwrap();
             let swapped = fs::read(whole.join(other)).unwrap();
-            for (what, instead) in [("cut", bytes[..bytes.len() / 2].to_vec()), ("swapped", swapped)] {
+            for (what, instead) in
+                [("cut", bytes[..bytes.len() / 2].to_vec()), ("swapped", swapped)]
+            {
                 let out = home.path().join("damaged");
                 copy(&whole, &out);
                 fs::write(out.join(name), instead).unwrap();
@@ -436,7 +504,7 @@ fn memory_is_bounded() {
         let mut command = Command::new("sh");
         command.arg("-c").arg(script).arg(cargo_bin(program)).args(arguments).output().unwrap()
     };
-    let output = run(256 * 1024, "n3p-plan", &["--scene", scene]);
+    let output = run(64 * 1024, "n3p-plan", &["--scene", scene]);
     assert!(output.status.success(), "{}", told(&output));
     // With policies: their networks are the laboratory's.
     let methods = ["--methods", "ha,ha-rs,mhha,n3p,rl-eval", "--count", "1"];
@@ -444,4 +512,44 @@ fn memory_is_bounded() {
     assert!(output.status.success(), "{}", told(&output));
     let output = run(8 * 1024, "n3p-plan", &["--scene", scene]);
     assert!(!output.status.success(), "8 MB of addresses are too few for any program");
+}
+
+#[test]
+fn an_evaluation_goes_on_only_as_what_it_was() {
+    let home = home();
+    let eval = |more: &[&str]| {
+        let mut command = Command::new(cargo_bin("n3p-eval"));
+        command.current_dir(home.path()).env("N3P_LOG", "off");
+        command.args(["--methods", "ha", "--type", "reverse", "--level", "easy", "--out", "out"]);
+        command.args(more).output().unwrap()
+    };
+    assert!(eval(&["--count", "4"]).status.success());
+    let rows = home.path().join("out/rows.csv");
+    let text = fs::read_to_string(&rows).unwrap();
+    // Whole: nothing is planned again, times stay what they were.
+    let output = eval(&["--count", "4", "--resume"]);
+    assert!(output.status.success(), "{}", told(&output));
+    assert_eq!(fs::read_to_string(&rows).unwrap(), text);
+    // Two rows and a half, the second of another scene: one is kept.
+    let lines: Vec<&str> = text.lines().collect();
+    let half = format!("{}\n{}\n{}\n{}", lines[0], lines[1], lines[3], &lines[4][..20]);
+    fs::write(&rows, half).unwrap();
+    assert!(eval(&["--count", "4", "--resume"]).status.success());
+    let again = fs::read_to_string(&rows).unwrap();
+    assert_eq!(again.lines().nth(1), Some(lines[1]));
+    let untimed = |text: &str| {
+        fs::write(&rows, text).unwrap();
+        read_csv(&rows).unwrap().iter().map(|r| r.untimed()).collect::<Vec<_>>()
+    };
+    assert_eq!(untimed(&again), untimed(&text));
+    for other in [
+        &["--count", "5"][..],
+        &["--count", "4", "--seed", "2"],
+        &["--count", "4", "--margin", "0.05"],
+    ] {
+        let output = eval(&[other, &["--resume"]].concat());
+        assert_eq!(output.status.code(), Some(2));
+        assert!(told(&output).contains("holds rows of other arguments"), "{}", told(&output));
+    }
+    assert_eq!(fs::read_to_string(&rows).unwrap(), text, "what is refused leaves the rows alone");
 }

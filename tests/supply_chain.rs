@@ -36,7 +36,9 @@ fn is_allowed(expression: &str, allowed: &dyn Fn(&str) -> bool) -> bool {
     // Split where no parenthesis is open.
     let split = |text: &str, by: &str| {
         let (mut parts, mut depth) = (vec![String::new()], 0);
-        for word in text.replace('(', " ( ").replace(')', " ) ").replace('/', " OR ").split_whitespace() {
+        for word in
+            text.replace('(', " ( ").replace(')', " ) ").replace('/', " OR ").split_whitespace()
+        {
             depth += i32::from(word == "(") - i32::from(word == ")");
             if word == by && depth == 0 {
                 parts.push(String::new());
@@ -124,6 +126,10 @@ fn no_crate_asks_for_a_newer_rust() {
     let ours = version(packages(&metadata).find(|p| p["name"] == "n3p").unwrap());
     for package in packages(&metadata) {
         let theirs = version(package);
-        assert!(theirs[..2.min(theirs.len())] <= ours[..2], "{} asks for {theirs:?}", package["name"]);
+        assert!(
+            theirs[..2.min(theirs.len())] <= ours[..2],
+            "{} asks for {theirs:?}",
+            package["name"]
+        );
     }
 }

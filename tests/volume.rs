@@ -13,7 +13,8 @@ use n3p::world::Scene;
 use predicates::prelude::*;
 use predicates::str::contains;
 
-const CONFIG: &str = "version = 1\nseed = 9\ncount = 50\nscenes_per_shard = 8\nmap_coordinates = 1e5\n";
+const CONFIG: &str =
+    "version = 1\nseed = 9\ncount = 27\nscenes_per_shard = 4\nmap_coordinates = 1e5\n";
 
 fn volume(dir: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
     let mut command = Command::cargo_bin("n3p-experiment").unwrap();
@@ -31,7 +32,7 @@ fn shards_make_the_same_records_in_any_number_of_runs() {
     fs::write(dir.path().join("v.toml"), CONFIG).unwrap();
     volume(dir.path(), &["--out", "whole", "--threads", "2"])
         .success()
-        .stdout(contains("| all | 50 |").and(contains("7 of 7 shards")));
+        .stdout(contains("| all | 27 |").and(contains("7 of 7 shards")));
     let whole = dir.path().join("whole");
     let expected = results(&whole);
     assert!(whole.join("volume.json").exists() && whole.join("volume.md").exists());
@@ -83,8 +84,9 @@ fn scenes_and_paths_are_written_for_others_to_check() {
             lines += 1;
         }
     }
-    assert_eq!(lines + failed, 17);
+    assert_eq!(lines + failed, 9);
     volume(dir.path(), &["--write-scene", "7", "--out", "one"]).success();
-    let written = Scene::read(&dir.path().join(format!("one/{}.json", draw(&config, 7).scene.name)));
+    let written =
+        Scene::read(&dir.path().join(format!("one/{}.json", draw(&config, 7).scene.name)));
     assert_eq!(written.unwrap(), draw(&config, 7).scene);
 }

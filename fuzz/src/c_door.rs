@@ -20,7 +20,8 @@ use crate::door::{number, some};
 
 /// A sequence of calls.
 pub fn c_door(data: &[u8]) {
-    let mut calls = Calls { u: Unstructured::new(data), handles: vec![ptr::null_mut()], parkers: 0 };
+    let mut calls =
+        Calls { u: Unstructured::new(data), handles: vec![ptr::null_mut()], parkers: 0 };
     for _ in 0..40 {
         if calls.u.is_empty() || calls.one().is_err() {
             break;
@@ -106,7 +107,15 @@ impl Calls<'_> {
                     let cells = some(&mut self.u, 64, |u| u8::arbitrary(u))?;
                     let columns = usize::from(u8::arbitrary(&mut self.u)? % 9);
                     let rows = cells.len().checked_div(columns).unwrap_or(0);
-                    n3p_lot_grid(self.handle()?, at.x, at.y, at.heading, columns, rows, cells.as_ptr())
+                    n3p_lot_grid(
+                        self.handle()?,
+                        at.x,
+                        at.y,
+                        at.heading,
+                        columns,
+                        rows,
+                        cells.as_ptr(),
+                    )
                 }
                 8 => {
                     let text = some(&mut self.u, 200, |u| u8::arbitrary(u))?;

@@ -26,7 +26,10 @@ pub fn path(scene: &Scene, frame: &Frame, path: &SmoothPath, contact: f64) {
         let to_curvature = |steer: f64| steer.tan() / vehicle.wheelbase;
         let from = to_curvature(file.steer_from.as_ref().map_or(file.steer[i], |s| s[i]));
         let to = to_curvature(file.steer_to.as_ref().map_or(file.steer[i], |s| s[i]));
-        assert!(from.abs() <= limit && to.abs() <= limit, "pose {i}: {from} or {to} beyond {limit}");
+        assert!(
+            from.abs() <= limit && to.abs() <= limit,
+            "pose {i}: {from} or {to} beyond {limit}"
+        );
         let length = f64::from(file.gears[i]) * chord_to_arc(here, next, f64::midpoint(from, to));
         let motion = Clothoid { from, to, length };
         let steps = (length.abs() / (0.01 * vehicle.scale().min(1.0))).ceil().max(1.0);
@@ -37,7 +40,10 @@ pub fn path(scene: &Scene, frame: &Frame, path: &SmoothPath, contact: f64) {
         }
         let turn = turn_between(pose.heading, next.heading);
         let apart = pose.distance(next);
-        assert!(apart <= 2e-5 + rounding && turn <= 2e-5, "pose {i}: leads {apart} m, {turn} rad aside");
+        assert!(
+            apart <= 2e-5 + rounding && turn <= 2e-5,
+            "pose {i}: leads {apart} m, {turn} rad aside"
+        );
     }
 }
 
@@ -62,7 +68,9 @@ fn drive(from: Pose, motion: &Clothoid, share: f64) -> Pose {
     let (mut pose, n) = (from, 16);
     let ds = motion.length * share / f64::from(n);
     for i in 0..n {
-        let at = |k: f64| motion.from + (motion.to - motion.from) * share * (f64::from(i) + k) / f64::from(n);
+        let at = |k: f64| {
+            motion.from + (motion.to - motion.from) * share * (f64::from(i) + k) / f64::from(n)
+        };
         let middle = pose.heading + ds * f64::midpoint(at(0.0), at(0.5)) / 2.0;
         // A chord of an arc is shorter than the arc.
         let half = ds * at(0.5) / 2.0;

@@ -14,7 +14,9 @@ use n3p::{Lot, Method, Models, Parker, Request, Vehicle};
 pub fn number(u: &mut Unstructured) -> Result<f64> {
     Ok(match u8::arbitrary(u)? {
         0 => f64::arbitrary(u)?,
-        1 => *u.choose(&[f64::NAN, f64::INFINITY, -0.0, 0.0, f64::MAX, 5e-324, 1e7, 5e11, -1e308])?,
+        1 => {
+            *u.choose(&[f64::NAN, f64::INFINITY, -0.0, 0.0, f64::MAX, 5e-324, 1e7, 5e11, -1e308])?
+        }
         _ => f64::from(i16::arbitrary(u)?) / 512.0,
     })
 }
@@ -24,7 +26,11 @@ fn pose(u: &mut Unstructured) -> Result<Pose> {
 }
 
 /// At most `most` of something.
-pub fn some<T>(u: &mut Unstructured, most: u8, mut one: impl FnMut(&mut Unstructured) -> Result<T>) -> Result<Vec<T>> {
+pub fn some<T>(
+    u: &mut Unstructured,
+    most: u8,
+    mut one: impl FnMut(&mut Unstructured) -> Result<T>,
+) -> Result<Vec<T>> {
     (0..u8::arbitrary(u)? % (most + 1)).map(|_| one(u)).collect()
 }
 
@@ -64,7 +70,8 @@ fn lot(u: &mut Unstructured) -> Result<Lot> {
     }
     if u8::arbitrary(u)? % 4 == 0 {
         let (origin, resolution) = (point(u)?, number(u)?);
-        let (columns, cells) = (usize::from(u8::arbitrary(u)? % 8), some(u, 40, |u| bool::arbitrary(u))?);
+        let (columns, cells) =
+            (usize::from(u8::arbitrary(u)? % 8), some(u, 40, |u| bool::arbitrary(u))?);
         lot.grid(origin, resolution, columns, &cells);
     }
     Ok(lot)
@@ -94,7 +101,8 @@ fn tried(u: &mut Unstructured) -> Result<()> {
     } else {
         Models::default()
     };
-    let method = if models.selector(Method::N3P, &vehicle).is_some() { method } else { Method::HA_RS };
+    let method =
+        if models.selector(Method::N3P, &vehicle).is_some() { method } else { Method::HA_RS };
     let Ok(mut parker) = Parker::by(method, vehicle, models) else { return Ok(()) };
     parker = parker.budget(Budget::new(usize::from(u8::arbitrary(u)?)));
     parker = parker.standstill_steering(*u.choose(&StandstillSteering::ALL)?);

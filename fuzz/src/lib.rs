@@ -15,12 +15,14 @@ mod lab;
 mod models;
 mod plans;
 mod scenes;
+mod seeds;
 mod texts;
 
 pub use c_door::c_door;
 pub use door::door;
 #[cfg(feature = "lab")]
 pub use lab::{lab_files, oracle};
-pub use models::{knn, patched_model, seeds as model_seeds, tensors};
+pub use models::{knn, patched_model, tensors};
 pub use plans::planner;
+pub use seeds::write_seeds;
 pub use texts::{path_file, scene_json, settings, tpcap, vehicle_toml};

@@ -5,6 +5,8 @@ use std::borrow::Cow;
 use std::path::Path;
 use std::sync::OnceLock;
 
+use n3p::curves::Segment;
+use n3p::geometry::Pose;
 use n3p::planners::goals::{self, Terms};
 use n3p::planners::{Budget, Planner};
 use n3p::selectors::foresight::Foresight;
@@ -14,8 +16,6 @@ use n3p::selectors::{Features, PoseSelector, shipped, tensor_file};
 use n3p::world::cell::{Axis, Grid};
 use n3p::world::generate::{GeneratorConfig, generate};
 use n3p::world::{Level, ParkingType, Scene};
-use n3p::curves::Segment;
-use n3p::geometry::Pose;
 use n3p::{Method, Models, Vehicle};
 use sha2::{Digest, Sha256};
 
@@ -35,7 +35,8 @@ fn knn_of(header: &[u8], payload: &[u8]) -> Vec<u8> {
     bytes.extend(knn_file::VERSION.to_le_bytes());
     bytes.extend((header.len() as u32).to_le_bytes());
     bytes.extend((payload.len() as u64).to_le_bytes());
-    let sum = Sha256::new().chain_update(&bytes).chain_update(header).chain_update(payload).finalize();
+    let sum =
+        Sha256::new().chain_update(&bytes).chain_update(header).chain_update(payload).finalize();
     bytes.extend(sum);
     bytes.extend(header);
     bytes.extend(payload);
@@ -70,7 +71,8 @@ pub(crate) fn mended(data: &[u8]) -> Option<Vec<u8>> {
 pub fn patched_model(data: &[u8]) {
     let Some((&which, patches)) = data.split_first() else { return };
     // The largest takes too long for each of many tries.
-    let files: Vec<_> = shipped::FILES.iter().filter(|(_, bytes)| bytes.len() < 5_000_000).collect();
+    let files: Vec<_> =
+        shipped::FILES.iter().filter(|(_, bytes)| bytes.len() < 5_000_000).collect();
     let (name, bytes) = files[usize::from(which) % files.len()];
     let is_knn = bytes.starts_with(&knn_file::MAGIC);
     let (begin, length) = if is_knn {
@@ -202,7 +204,8 @@ pub fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         let entry = json["__metadata__"]["n3p"].as_str().unwrap();
         let header = entry.split_once("\"header\":").unwrap().1.strip_suffix('}').unwrap();
         if header.len() < 20_000 {
-            let tensor = tensor_file::NamedTensor::f32("layers.0.bias".to_owned(), vec![2], &[0.5, 1.0]);
+            let tensor =
+                tensor_file::NamedTensor::f32("layers.0.bias".to_owned(), vec![2], &[0.5, 1.0]);
             seeds.push(("tensors", tensor_file::encode(header, vec![tensor])));
         }
     }

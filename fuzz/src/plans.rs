@@ -97,11 +97,16 @@ fn tried(planner: &mut dyn Planner, asked: &Asked) {
         let ends = [scene.start, goal];
         let driven = Driven::new(ends, &scene.vehicle, &planned.problem.frame, &driven, &limits);
         let moments = driven.expect("the usual limits").moments;
-        let rises = moments.windows(2).all(|m| m[0].time <= m[1].time && m[0].distance <= m[1].distance + 1e-9);
+        let rises = moments
+            .windows(2)
+            .all(|m| m[0].time <= m[1].time && m[0].distance <= m[1].distance + 1e-9);
         assert!(rises, "time or distance falls");
         let finite = |v: f64| v.is_finite();
         assert!(moments.iter().all(|m| finite(m.time) && finite(m.speed) && m.pose.is_finite()));
-        assert!(moments.last().is_none_or(|m| m.speed.abs() < 1e-6), "it does not stand at the end");
+        assert!(
+            moments.last().is_none_or(|m| m.speed.abs() < 1e-6),
+            "it does not stand at the end"
+        );
     }
 }
 

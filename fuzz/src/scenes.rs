@@ -14,7 +14,11 @@ fn about(u: &mut Unstructured, reach: f64) -> Result<f64> {
 }
 
 fn pose_about(u: &mut Unstructured, pose: Pose, reach: f64) -> Result<Pose> {
-    Ok(Pose::new(pose.x + about(u, reach)?, pose.y + about(u, reach)?, pose.heading + about(u, 0.6)?))
+    Ok(Pose::new(
+        pose.x + about(u, reach)?,
+        pose.y + about(u, reach)?,
+        pose.heading + about(u, 0.6)?,
+    ))
 }
 
 /// A scene; most have a free start and goal.

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
+use n3p::Vehicle;
 use n3p::output::PathFile;
 use n3p::planners::{HybridAStarConfig, Problem};
 use n3p::toml_file::{Setting, parse_toml};
 use n3p::world::generate::{GeneratorConfig, generate};
 use n3p::world::{Level, ParkingType, Scene, tpcap as tpcap_file};
-use n3p::Vehicle;
 
 const ORIGIN: &str = "fuzz";
 

@@ -7,9 +7,9 @@ use anyhow::Result;
 use clap::{Args, Parser, Subcommand};
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::files::reason;
+use n3p::lab::dataset::Part;
 use n3p::lab::evaluation::{report, rows};
 use n3p::lab::experiments::{ExperimentConfig, ExperimentError, Given, runner};
-use n3p::lab::dataset::Part;
 use n3p::lab::training;
 use n3p::lab::volume::{self, VolumeConfig, VolumeError, VolumeOptions};
 use n3p::toml_file::Setting;
@@ -193,7 +193,8 @@ fn run_volume(args: &VolumeArgs) -> Result<ExitCode> {
     if let Some(number) = args.write_scene {
         let case = volume::draw::draw(&config, number);
         let path = out.join(format!("{}.json", case.scene.file_stem()));
-        std::fs::create_dir_all(&out).map_err(|error| BadInput(format!("--out: {}", reason(&error))))?;
+        std::fs::create_dir_all(&out)
+            .map_err(|error| BadInput(format!("--out: {}", reason(&error))))?;
         case.scene.write(&path).or_bad_input()?;
         cli::print(path.display())?;
         return Ok(ExitCode::SUCCESS);
@@ -205,7 +206,11 @@ fn run_volume(args: &VolumeArgs) -> Result<ExitCode> {
         sample_every: args.sample_every,
     };
     let totals = volume::run(&config, &out, &options).map_err(|error: VolumeError| {
-        if error.is_bad_input() { BadInput(error.to_string()).into() } else { anyhow::Error::from(error) }
+        if error.is_bad_input() {
+            BadInput(error.to_string()).into()
+        } else {
+            anyhow::Error::from(error)
+        }
     })?;
     cli::print(totals.markdown().trim_end())?;
     cli::print(format!("{}: {} of {} shards finished", out.display(), totals.shards, totals.of))?;

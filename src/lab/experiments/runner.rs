@@ -514,7 +514,8 @@ impl Runner<'_> {
             Todo::GoOn => {}
             Todo::BeginAnew => remove(&rows_csv)?,
         }
-        let (mut outputs, mut rows) = Outputs::resume(self.out, None, &cases, &suite_config.methods)?;
+        let (mut outputs, mut rows) =
+            Outputs::resume(self.out, None, &cases, &suite_config.methods)?;
         let bar = progress::bar((cases.len() * e.methods.len()) as u64, "evaluate");
         bar.set_position(rows.len() as u64);
         let new = suite::run(&cases, &models, &suite_config, rows.len(), |case, episode| {

@@ -50,7 +50,8 @@ pub fn draw(config: &VolumeConfig, number: u64) -> Case {
             }
         }
     };
-    let scene = Scene { name: format!("{number:07}-{}", world.name()), ..place(config, number, scene) };
+    let scene =
+        Scene { name: format!("{number:07}-{}", world.name()), ..place(config, number, scene) };
     Case { scene, kind, level, set: world.name().to_owned() }
 }
 

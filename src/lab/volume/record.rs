@@ -230,7 +230,8 @@ impl Results {
             (&mut self.most_expansions, &other.most_expansions),
             (&mut self.worst_quality, &other.worst_quality),
         ];
-        all.into_iter().for_each(|(mine, others)| others.0.iter().for_each(|e| mine.push(e.number, e.value)));
+        all.into_iter()
+            .for_each(|(mine, others)| others.0.iter().for_each(|e| mine.push(e.number, e.value)));
         self.expansions.add(&other.expansions);
     }
 

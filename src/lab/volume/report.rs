@@ -38,7 +38,8 @@ impl Totals {
             let json = serde_json::json!({
                 "config": config, "results": totals.results, "times": totals.times,
             });
-            for (name, text) in [("volume.json", format!("{json:#}\n")), ("volume.md", totals.markdown())]
+            for (name, text) in
+                [("volume.json", format!("{json:#}\n")), ("volume.md", totals.markdown())]
             {
                 let path = out.join(name);
                 write_whole(&path, text.as_bytes())

@@ -42,10 +42,18 @@ pub struct VolumeOptions {
 /// A run that did not finish.
 #[derive(Debug, thiserror::Error)]
 pub enum VolumeError {
-    /// A file or folder cannot be read or written.
-    #[error("{path}: {}; choose a folder you can write to", reason(error))]
+    /// An output folder cannot be made.
+    #[error("{path}: cannot be an output folder: {}; choose one you can write to", reason(error))]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// The operating system's reason.
+        error: io::Error,
+    },
+    /// A file cannot be read or written.
+    #[error("{path}: {}", reason(error))]
     Io {
-        /// The file or folder.
+        /// The file.
         path: PathBuf,
         /// The operating system's reason.
         error: io::Error,
@@ -69,7 +77,7 @@ pub enum VolumeError {
 impl VolumeError {
     /// Whether the caller's input is at fault.
     pub fn is_bad_input(&self) -> bool {
-        matches!(self, Self::Other { .. } | Self::Models(_))
+        matches!(self, Self::Folder { .. } | Self::Other { .. } | Self::Models(_))
     }
 }
 
@@ -79,11 +87,15 @@ fn failed(path: &Path) -> impl FnOnce(io::Error) -> VolumeError + '_ {
 
 /// Plans what is not finished of the shards of `options.part` into the folder `out`. Returns what all
 /// records there say together.
-pub fn run(config: &VolumeConfig, out: &Path, options: &VolumeOptions) -> Result<Totals, VolumeError> {
+pub fn run(
+    config: &VolumeConfig,
+    out: &Path,
+    options: &VolumeOptions,
+) -> Result<Totals, VolumeError> {
     for folder in [Some(out), options.samples.as_deref()].into_iter().flatten() {
         std::fs::create_dir_all(folder)
             .and_then(|()| remove_leftovers(folder))
-            .map_err(failed(folder))?;
+            .map_err(|error| VolumeError::Folder { path: folder.to_owned(), error })?;
     }
     let settings = out.join("config.toml");
     match std::fs::read_to_string(&settings) {
@@ -169,7 +181,13 @@ impl Job<'_> {
         let first = shard * self.config.scenes_per_shard;
         for number in first..self.config.count.min(first + self.config.scenes_per_shard) {
             let sampled = self.options.samples.is_some() && number % self.options.sample_every == 0;
-            self.scene(number, planners, &mut results, &mut times, sampled.then_some(&mut samples))?;
+            self.scene(
+                number,
+                planners,
+                &mut results,
+                &mut times,
+                sampled.then_some(&mut samples),
+            )?;
         }
         if let Some(path) = self.samples_path(shard) {
             write_whole(&path, samples.as_bytes()).map_err(failed(&path))?;
