@@ -221,6 +221,10 @@ fn home() -> tempfile::TempDir {
         let data = tempfile::tempdir().unwrap();
         let mut command = Command::new(cargo_bin("n3p-collect"));
         command.args(["--config", "collect.toml", "--out"]).arg(data.path().join("data"));
+        // Fewer cells, wide enough for some samples of every type.
+        for set in ["grid.lane_width.min=6.0", "grid.lane_width.max=6.0", "max_expansions=2000"] {
+            command.args(["--set", set]);
+        }
         let output = command.current_dir(home.path()).output().unwrap();
         assert!(output.status.success(), "{}", told(&output));
         data
