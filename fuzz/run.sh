@@ -43,12 +43,12 @@ build() {
   RUSTC_BOOTSTRAP=1 RUSTFLAGS="$flags" cargo build --release --locked --quiet --target "$triple" \
     --target-dir "$target/$kind" "${features[@]}" $(names | sed 's/^/--bin /') "$@"
 }
-# A plan takes milliseconds; what takes ten seconds is a bug. Memory in megabytes.
+# A plan takes milliseconds; what takes half a minute, on a busy machine too, is a bug. Memory in megabytes.
 fuzz() {
   local name="$1"
   shift
   mkdir -p "$target/learnt/$name" "$target/found/$name"
-  "$bin/$name" -artifact_prefix="$target/found/$name/" -timeout=10 -rss_limit_mb=2048 \
+  "$bin/$name" -artifact_prefix="$target/found/$name/" -timeout=30 -rss_limit_mb=2048 \
     -max_len=4096 -print_final_stats=1 -verbosity=0 "$@"
 }
 
@@ -78,7 +78,7 @@ case "${1:-}" in
     name="${2:?a target}"
     mkdir -p "$target/minimal/$name"
     rm -f "$target/minimal/$name"/*
-    "$bin/$name" -merge=1 -verbosity=0 -max_len=4096 "$target/minimal/$name" "corpus/$name" "$target/learnt/$name"
+      "$bin/$name" -merge=1 -verbosity=0 -max_len=4096 "$target/minimal/$name" "corpus/$name" "$target/learnt/$name"
     ;;
   "")
     sed -n '2,/^set/p' "$0" | grep '^#'
