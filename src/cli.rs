@@ -188,7 +188,7 @@ impl CostArgs {
 }
 
 /// A driving policy from outside.
-#[derive(clap::Args)]
+#[derive(Debug, clap::Args)]
 pub struct PolicyArgs {
     /// A driving policy from outside, the method "policy": an .onnx file, or the command of a
     /// program (see docs/policies.md).

@@ -1,6 +1,6 @@
 //! Files that are whole or absent, and what every reader and writer says when they fail.
 
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
@@ -57,6 +57,26 @@ pub fn check_writable(path: &Path) -> io::Result<()> {
     remove_if_present(&temporary)
 }
 
+/// A folder that is this process's until this is dropped or the process ends, however it does.
+#[derive(Debug)]
+#[must_use]
+pub struct Keeper(#[expect(dead_code, reason = "it is held, not read")] Option<File>);
+
+/// Keeps `folder` for this process; [`ErrorKind::ResourceBusy`] where another process has it. Nothing is written,
+/// and where folders cannot be locked everybody may have it.
+pub fn keep(folder: &Path) -> io::Result<Keeper> {
+    let Ok(file) = File::open(folder) else {
+        // Not every system opens folders; who cannot write here is told so when it is tried.
+        return Ok(Keeper(None));
+    };
+    match file.try_lock() {
+        Ok(()) => Ok(Keeper(Some(file))),
+        Err(TryLockError::WouldBlock) => Err(ErrorKind::ResourceBusy.into()),
+        Err(TryLockError::Error(e)) if e.kind() == ErrorKind::Unsupported => Ok(Keeper(None)),
+        Err(TryLockError::Error(e)) => Err(e),
+    }
+}
+
 /// Removes the unfinished files that killed runs left in `folder`.
 pub fn remove_leftovers(folder: &Path) -> io::Result<()> {
     for entry in fs::read_dir(folder)? {
@@ -111,6 +131,7 @@ pub fn reason(error: &io::Error) -> String {
         ErrorKind::IsADirectory => "it is a folder, not a file".to_owned(),
         ErrorKind::NotADirectory => "it is a file, not a folder".to_owned(),
         ErrorKind::AlreadyExists => "a file of this name is in the way".to_owned(),
+        ErrorKind::ResourceBusy => "another process is at work there".to_owned(),
         ErrorKind::StorageFull => "the disk is full".to_owned(),
         ErrorKind::InvalidData => "it is not text (UTF-8)".to_owned(),
         _ => error.to_string(),
@@ -167,6 +188,17 @@ mod tests {
         let _listener = UnixListener::bind(&socket).unwrap();
         assert!(write_whole(&socket, b"x").is_err(), "a socket cannot be opened");
         assert!(fs::metadata(&socket).unwrap().file_type().is_socket());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_folder_is_one_keepers_at_a_time() {
+        let dir = tempfile::tempdir().unwrap();
+        let kept = keep(dir.path()).unwrap();
+        assert_eq!(keep(dir.path()).unwrap_err().kind(), ErrorKind::ResourceBusy);
+        drop(kept);
+        drop(keep(dir.path()).unwrap());
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
     }
 
     #[test]

@@ -43,6 +43,8 @@ pub enum Stream {
     Lot = 15,
     /// A generated scene of an angled bay.
     Angled = 16,
+    /// Where in the world a scene of a volume run is put.
+    Place = 17,
     /// A world to learn manoeuvres in.
     World = 20,
     /// Errors that a driven car meets.

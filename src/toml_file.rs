@@ -115,7 +115,12 @@ pub fn read_settings<T: DeserializeOwned>(
 pub fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, TomlError> {
     let text = fs::read_to_string(path)
         .map_err(|error| TomlError::Read { path: path.to_owned(), error })?;
-    toml::from_str(&text).map_err(|e| {
+    parse_toml(&text, path)
+}
+
+/// The same of a text; `path` is where it comes from, for messages.
+pub fn parse_toml<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, TomlError> {
+    toml::from_str(text).map_err(|e| {
         let start = e.span().map_or(0, |span| span.start.min(text.len()));
         let line = text.as_bytes()[..start].iter().filter(|b| **b == b'\n').count();
         TomlError::Parse {
@@ -146,7 +151,15 @@ pub enum VehicleFileError {
 impl Vehicle {
     /// Reads and checks a TOML file with the fields of a vehicle.
     pub fn read(path: &Path) -> Result<Self, VehicleFileError> {
-        let vehicle: Self = read_toml(path)?;
+        Self::checked(read_toml(path)?, path)
+    }
+
+    /// The same of a text; `path` is where it comes from, for messages.
+    pub fn from_toml(text: &str, path: &Path) -> Result<Self, VehicleFileError> {
+        Self::checked(parse_toml(text, path)?, path)
+    }
+
+    fn checked(vehicle: Self, path: &Path) -> Result<Self, VehicleFileError> {
         let invalid = |error| VehicleFileError::Invalid { path: path.to_owned(), error };
         vehicle.validate().map_err(invalid)?;
         Ok(vehicle)

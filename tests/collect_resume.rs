@@ -63,8 +63,15 @@ fn every_state_between_two_renames_is_mended() {
     let (shard, manifest) = ("reverse-0002.parquet", "reverse.manifest.json");
     let half = |name: &str| all[name][..all[name].len() / 2].to_vec();
     type State<'a> = (&'a str, &'a [(&'a str, Vec<u8>)]);
-    let states: [State; 6] = [
+    let states: [State; 7] = [
         ("metadata in the making", &[("metadata.json.77.tmp", half("metadata.json"))]),
+        (
+            "a card in the making",
+            &[
+                ("metadata.json", all["metadata.json"].clone()),
+                ("card.md.77.tmp", b"# Data".to_vec()),
+            ],
+        ),
         ("metadata alone", &[("metadata.json", all["metadata.json"].clone())]),
         (
             "a shard in the making",

@@ -293,6 +293,34 @@ fn one_process_serves_all_episodes_and_dies_with_the_policy() {
     assert!(!exists());
 }
 
+/// What a program starts used to outlive it.
+#[cfg(unix)]
+#[test]
+fn what_a_program_started_ends_with_it() {
+    let hangs = "sleep 600 & echo $! >> 'PIDS'; sleep 600";
+    let floods = "{ while :; do echo x; done; } & echo $! >> 'PIDS'; read q; sleep 600";
+    let ends = "sleep 600 & echo $! >> 'PIDS'; read q; exit 3";
+    let folder = tempfile::tempdir().unwrap();
+    for (number, script) in [hangs, floods, ends].into_iter().enumerate() {
+        let pids = folder.path().join(number.to_string());
+        let mut policy = sh(&script.replace("PIDS", &pids.display().to_string()), SHORT);
+        let _ = act(&mut policy, 0);
+        let _ = act(&mut policy, 1);
+        drop(policy);
+        let pid = fs::read_to_string(&pids).unwrap();
+        // Whoever adopts it may be late to bury it: a zombie has ended.
+        let runs = || {
+            let stat = fs::read_to_string(format!("/proc/{}/stat", pid.trim()));
+            stat.is_ok_and(|s| !s.contains(") Z "))
+        };
+        let begun = Instant::now();
+        while runs() && begun.elapsed() < Duration::from_secs(5) {
+            sleep(Duration::from_millis(5));
+        }
+        assert!(!runs(), "{script}");
+    }
+}
+
 #[test]
 fn commands_that_cannot_be_started_are_refused_at_once() {
     for (command, expected) in [

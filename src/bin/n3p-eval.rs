@@ -7,11 +7,12 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::Parser;
 use n3p::cli::{self, BadInput, CostArgs, OrBadInput, PolicyArgs, TermsArgs};
-use n3p::episode::Case;
+use n3p::episode::{Case, Row};
+use n3p::files::Keeper;
 use n3p::lab::driving::{DriveConfig, drive};
 use n3p::lab::evaluation::report::{self, Provenance};
 use n3p::lab::evaluation::suite::{self, Drawn, SuiteConfig, SuiteError, World};
-use n3p::lab::evaluation::{Outputs, drives, metrics, quality};
+use n3p::lab::evaluation::{Outputs, RunRecord, drives, metrics, quality};
 use n3p::lab::progress;
 use n3p::lab::training;
 use n3p::n3p::{Method, Models};
@@ -64,6 +65,9 @@ struct Args {
     /// Write rows (CSV, Parquet) and reports (Markdown, HTML) to this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Go on where an interrupted run with the same arguments stopped: its rows are kept.
+    #[arg(long, requires = "out")]
+    resume: bool,
     /// Print rows and summaries as JSON instead of tables.
     #[arg(long)]
     json: bool,
@@ -143,6 +147,43 @@ fn main() -> ExitCode {
     cli::run(|| evaluate(&cli::parse()))
 }
 
+/// The outputs, the rows that an interrupted run left there, and what keeps the folder.
+fn begin(
+    args: &Args,
+    cases: &[Case],
+    models: &Models,
+    config: &SuiteConfig,
+    driving: Option<&DriveConfig>,
+) -> Result<(Outputs, Vec<Row>, Option<Keeper>)> {
+    let paths = args.paths.as_deref();
+    let Some(out) = &args.out else {
+        return Ok((Outputs::create(None, paths).or_bad_input()?, Vec::new(), None));
+    };
+    let scenes: Vec<_> = cases.iter().map(|c| (&c.scene, c.kind, c.level, &c.set)).collect();
+    let settings = serde_json::json!({
+        "methods": config.methods, "models": models.checksums().or_bad_input()?,
+        "settings": format!("{:?}", config.settings), "effort": config.budget.effort, "seed": args.seed,
+        "max_expansions": config.budget.max_expansions, "terms": format!("{:?}", config.terms),
+        "driving": driving, "policy": format!("{:?}", args.policy), "paths": args.paths.is_some(),
+    });
+    let scenes = serde_json::to_vec(&scenes)?;
+    let record = RunRecord::new(&[settings.to_string().as_bytes(), &scenes]);
+    let Some(keeper) = record.claim(out, args.resume).or_bad_input()? else {
+        let out = out.display();
+        let text = format!(
+            "--resume: {out} holds rows of other arguments, models, scenes or of another build; give \
+             --out a new folder, or leave --resume out to begin anew"
+        );
+        return Err(BadInput(text).into());
+    };
+    let (outputs, done) = if args.resume {
+        Outputs::resume(out, paths, cases, &config.methods).or_bad_input()?
+    } else {
+        (Outputs::create(Some(out), paths).or_bad_input()?, Vec::new())
+    };
+    Ok((outputs, done, Some(keeper)))
+}
+
 fn evaluate(args: &Args) -> Result<ExitCode> {
     let policy = args.policy.driver()?;
     let vehicle = match &args.vehicle {
@@ -174,12 +215,13 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
     let vehicle = vehicle.or(models.vehicle()).unwrap_or_default();
     let Chosen { cases, title, complaint } = choose(args, &vehicle, &config.methods, &models)?;
     suite::check(&cases, &models, &config).or_bad_input()?;
-    let mut outputs = Outputs::create(args.out.as_deref(), args.paths.as_deref()).or_bad_input()?;
+    let driving = args.drive.then(|| args.driving.config(args.seed));
+    let (mut outputs, done, _keeper) = begin(args, &cases, &models, &config, driving.as_ref())?;
 
     let bar = progress::bar((cases.len() * config.methods.len()) as u64, "evaluate");
-    let driving = args.drive.then(|| args.driving.config(args.seed));
+    bar.set_position(done.len() as u64);
     let mut narrow = BTreeSet::new();
-    let rows = suite::run(&cases, &models, &config, 0, |case, episode| {
+    let rows = suite::run(&cases, &models, &config, done.len(), |case, episode| {
         if episode.problem.margin < args.terms.margin {
             narrow.insert(case.scene.name.clone());
         }
@@ -189,10 +231,12 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
         outputs.take(case, episode, &models, driven).map_err(anyhow::Error::from)
     });
     // As in the checks before: a suite that cannot run is the user's to mend, a full disk is not.
-    let mut rows = rows.map_err(|error| match error.downcast::<SuiteError>() {
+    let new = rows.map_err(|error| match error.downcast::<SuiteError>() {
         Ok(suite) => BadInput(suite.to_string()).into(),
         Err(other) => other,
     })?;
+    let mut rows = done;
+    rows.extend(new);
     bar.finish_and_clear();
     if !narrow.is_empty() {
         tracing::warn!(

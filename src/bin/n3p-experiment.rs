@@ -7,9 +7,11 @@ use anyhow::Result;
 use clap::{Args, Parser, Subcommand};
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::files::reason;
+use n3p::lab::dataset::Part;
 use n3p::lab::evaluation::{report, rows};
 use n3p::lab::experiments::{ExperimentConfig, ExperimentError, Given, runner};
 use n3p::lab::training;
+use n3p::lab::volume::{self, VolumeConfig, VolumeError, VolumeOptions};
 use n3p::toml_file::Setting;
 use n3p::vehicle::Vehicle;
 
@@ -44,12 +46,42 @@ enum Command {
         #[command(flatten)]
         given: GivenArgs,
     },
+    /// Plans very many scenes once each by n3p and has every path checked, or goes on where an interrupted
+    /// run stopped. Exit code 1 where a path is refused.
+    Volume(VolumeArgs),
     /// Lists the experiments of a folder.
     List {
         /// The folder.
         #[arg(default_value = "experiments")]
         folder: PathBuf,
     },
+}
+
+#[derive(Args)]
+struct VolumeArgs {
+    /// What to plan, such as experiments/volume/volume.toml.
+    file: PathBuf,
+    /// Folder of the records [default: results/NAME beside the file].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// The share of this process, such as 2/3; the run that finds all shards finished writes the table.
+    #[arg(long, default_value_t, value_name = "I/N")]
+    shard: Part,
+    /// Worker threads; they disturb times, never results.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: u16,
+    /// Write scenes and paths to this folder for others to check, JSON lines for each shard.
+    #[arg(long, value_name = "DIR")]
+    samples: Option<PathBuf>,
+    /// Of so many scenes write one.
+    #[arg(long, default_value_t = 1, value_name = "N", requires = "samples", value_parser = clap::value_parser!(u64).range(1..))]
+    sample_every: u64,
+    /// Write the scene of this number to --out instead, as a file.
+    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["shard", "samples"])]
+    write_scene: Option<u64>,
+    /// A setting instead of the file's, such as count=1000; may be given several times
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<Setting>,
 }
 
 #[derive(Args)]
@@ -93,6 +125,7 @@ fn main() -> ExitCode {
     cli::run(|| match &args.command {
         Command::Run { file, out, given } => run(file, out.as_deref(), given),
         Command::Reproduce { file, out, given } => reproduce(file, out.as_deref(), given),
+        Command::Volume(args) => run_volume(args),
         Command::List { folder } => list(folder),
     })
 }
@@ -150,6 +183,38 @@ fn reproduce(file: &Path, out: Option<&Path>, args: &GivenArgs) -> Result<ExitCo
     }
     cli::print(format!("{} differences from {}", lines.len(), recorded.display()))?;
     Ok(ExitCode::FAILURE)
+}
+
+fn run_volume(args: &VolumeArgs) -> Result<ExitCode> {
+    let config = VolumeConfig::read(&args.file, &args.set).or_bad_input()?;
+    let stem = args.file.file_stem().unwrap_or_default();
+    let usual = args.file.parent().unwrap_or(Path::new("")).join("results").join(stem);
+    let out = args.out.clone().unwrap_or(usual);
+    if let Some(number) = args.write_scene {
+        let case = volume::draw::draw(&config, number);
+        let path = out.join(format!("{}.json", case.scene.file_stem()));
+        std::fs::create_dir_all(&out)
+            .map_err(|error| BadInput(format!("--out: {}", reason(&error))))?;
+        case.scene.write(&path).or_bad_input()?;
+        cli::print(path.display())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let options = VolumeOptions {
+        part: args.shard,
+        threads: args.threads.into(),
+        samples: args.samples.clone(),
+        sample_every: args.sample_every,
+    };
+    let totals = volume::run(&config, &out, &options).map_err(|error: VolumeError| {
+        if error.is_bad_input() {
+            BadInput(error.to_string()).into()
+        } else {
+            anyhow::Error::from(error)
+        }
+    })?;
+    cli::print(totals.markdown().trim_end())?;
+    cli::print(format!("{}: {} of {} shards finished", out.display(), totals.shards, totals.of))?;
+    Ok(if totals.is_clean() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 fn same_folder(a: &Path, b: &Path) -> bool {

@@ -6,7 +6,7 @@ mod row;
 mod spot_report;
 
 pub use clearance::{Clearance, WAY_ENDS};
-pub use comparison::fill;
+pub use comparison::{CHANGE_M, FLOOR_M, fill};
 pub use row::Row;
 pub use spot_report::{SpotReport, abstraction, regions};
 

@@ -10,6 +10,7 @@
 //! - [`driving`]: plans driven in closed loop by a car with lags and errors
 //! - [`evaluation`]: the independent oracle, rows, tables, reports
 //! - [`experiments`]: a whole pipeline from one versioned file
+//! - [`volume`]: very many scenes, each planned once and checked
 
 pub mod dataset;
 pub mod driving;
@@ -19,3 +20,4 @@ pub mod nn;
 pub mod progress;
 pub mod rl;
 pub mod training;
+pub mod volume;

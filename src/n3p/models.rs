@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use super::method::{Learnt, Method};
 use super::{Driver, TrainedPolicy, more};
+use crate::files::sha256_hex;
 use crate::selectors::artefact::{self, ArtefactError, Fault, find_model};
 use crate::selectors::by_kind::ByKind;
 use crate::selectors::foresight::Foresight;
@@ -29,6 +30,8 @@ pub struct Models {
     /// What manoeuvres are worth in a scene.
     foresight: Option<Arc<Foresight>>,
     outside: Option<Arc<dyn Driver>>,
+    /// Whence all of them come.
+    files: Vec<PathBuf>,
 }
 
 /// The models of one vehicle: for each parking type at most one KNN and one MLP selector, and one
@@ -123,15 +126,18 @@ impl Models {
             return Err(ModelsError::TwoForesights(path.to_owned()));
         }
         self.foresight = Some(Arc::new(Foresight::load(path)?));
+        self.files.push(path.to_owned());
         Ok(())
     }
 
     fn add_selector(&mut self, model: Model) -> Result<(), ModelsError> {
+        let file = model.path().to_owned();
         let Some(&vehicle) = model.vehicle() else {
             if self.fleet.is_some() {
                 return Err(ModelsError::TwoFleets(model.path().to_owned()));
             }
             self.fleet = Some(model.into_selector());
+            self.files.push(file);
             return Ok(());
         };
         let (path, training) = (model.path().to_owned(), model.training());
@@ -155,6 +161,7 @@ impl Models {
                 }));
             }
         }
+        self.files.push(file);
         Ok(())
     }
 
@@ -165,6 +172,7 @@ impl Models {
         if own.drivers.insert(course, driver).is_some() {
             return Err(ModelsError::TwoPolicies { path, course });
         }
+        self.files.push(path);
         Ok(())
     }
 
@@ -177,6 +185,18 @@ impl Models {
             self.vehicles.len() - 1
         });
         &mut self.vehicles[at]
+    }
+
+    /// SHA-256 of each file, in lower-case hexadecimal, in the order in which they were loaded: read anew.
+    pub fn checksums(&self) -> Result<Vec<String>, ArtefactError> {
+        let sum = |path: &PathBuf| Ok(sha256_hex(&[&artefact::read(path)?]));
+        self.files.iter().map(sum).collect()
+    }
+
+    /// The same with one more selector of preparatory poses.
+    pub fn with_selector(mut self, model: Model) -> Result<Self, ModelsError> {
+        self.add_selector(model)?;
+        Ok(self)
     }
 
     /// The same with a policy from outside.

@@ -112,10 +112,15 @@ impl PathFile {
 
     /// Reads a path file and checks that its arrays fit together.
     pub fn read(file: &FilePath) -> Result<Self, PathFileError> {
-        let format = |message| PathFileError::Format { path: file.to_owned(), message };
         let text = std::fs::read_to_string(file)
             .map_err(|error| PathFileError::Io { path: file.to_owned(), error })?;
-        let path: Self = serde_json::from_str(&text).map_err(|e| {
+        Self::from_json(&text, file)
+    }
+
+    /// The path of such a text, its arrays checked. `origin` is where the text comes from, for messages.
+    pub fn from_json(text: &str, origin: &FilePath) -> Result<Self, PathFileError> {
+        let format = |message| PathFileError::Format { path: origin.to_owned(), message };
+        let path: Self = serde_json::from_str(text).map_err(|e| {
             format(format!("not a path file: {e}; expected poses, gears, steer and method"))
         })?;
         let (poses, gears, steer) = (path.poses.len(), path.gears.len(), path.steer.len());

@@ -23,6 +23,7 @@ pub mod lots;
 pub mod maps;
 mod obstacles;
 mod outlines;
+mod placed;
 mod previous;
 pub mod scene;
 mod scene_file;

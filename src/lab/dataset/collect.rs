@@ -339,7 +339,8 @@ impl Run<'_> {
         let prefix = format!("{kind}-");
         let mine = |name: &&String| {
             let shard = name.strip_prefix(&prefix).and_then(|rest| rest.split('.').next());
-            let whole = [manifest_path(self.folder, kind), metadata_path(self.folder)];
+            let card = self.folder.join("card.md");
+            let whole = [manifest_path(self.folder, kind), metadata_path(self.folder), card];
             name.ends_with(TEMPORARY)
                 && match shard.and_then(|digits| digits.parse().ok()) {
                     Some(shard) => self.options.part.contains(shard),

@@ -61,7 +61,7 @@ impl Default for DriveConfig {
 }
 
 /// What became of one plan.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DriveRow {
     /// Name of the scene.
     pub scene: String,

@@ -1,6 +1,8 @@
 //! What became of plans that were driven: a line per scene and method as CSV, and a table.
 
 use std::fmt::Write;
+use std::io::{self, ErrorKind};
+use std::path::Path;
 
 use super::metrics::percentile;
 use super::table::{Table, kind_name, part_name};
@@ -74,6 +76,19 @@ pub fn table(drives: &[DriveRow]) -> Table {
         headers: headers.map(str::to_owned).to_vec(),
         rows: lines,
         text_columns: 3,
+    }
+}
+
+/// What a run that was interrupted left of its drives, in `drives.jsonl`; what is no whole line is left out, and
+/// so is everything where there is no file.
+pub(super) fn read(path: &Path) -> io::Result<Vec<DriveRow>> {
+    match std::fs::read(path) {
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(Vec::new()),
+        bytes => {
+            let bytes = bytes?;
+            let lines = bytes.split(|b| *b == b'\n');
+            Ok(lines.filter_map(|line| serde_json::from_slice(line).ok()).collect())
+        }
     }
 }
 

@@ -20,5 +20,5 @@ pub mod table;
 pub mod trace;
 
 pub use learning_curve::CurvePoint;
-pub use outputs::{OutputError, Outputs};
+pub use outputs::{OutputError, Outputs, RunRecord};
 pub use suite::{SuiteConfig, SuiteError};

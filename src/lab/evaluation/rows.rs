@@ -61,6 +61,14 @@ impl RowWriter {
         Ok(Self { path: path.to_owned(), file })
     }
 
+    /// Goes on after these rows, of which a reader finds all at any time.
+    pub fn go_on(path: &Path, rows: &[Row]) -> Result<Self, RowsError> {
+        write_csv(path, rows)?;
+        let file = File::options().append(true).open(path);
+        let file = file.map_err(|error| RowsError::Io { path: path.to_owned(), error })?;
+        Ok(Self { path: path.to_owned(), file })
+    }
+
     /// Appends one row.
     pub fn push(&mut self, row: &Row) -> Result<(), RowsError> {
         // One unbuffered write: nothing waits in this process.

@@ -6,7 +6,7 @@
 
 use std::collections::{HashMap, HashSet};
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Write};
+use std::io::{self, BufRead, BufReader};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -73,23 +73,6 @@ pub(super) fn mm(v: f64) -> f64 {
     (v * 1e3).round() / 1e3 + 0.0
 }
 
-/// Appends traces to a file of JSON lines, each flushed at once.
-pub struct TraceWriter(File);
-
-impl TraceWriter {
-    /// Begins `path` anew.
-    pub fn create(path: &Path) -> io::Result<Self> {
-        File::create(path).map(Self)
-    }
-
-    /// Appends one trace.
-    pub fn push(&mut self, trace: &Trace) -> io::Result<()> {
-        let line = serde_json::to_string(trace).expect("plain numbers and strings") + "\n";
-        // One unbuffered write: nothing waits in this process.
-        self.0.write_all(line.as_bytes())
-    }
-}
-
 /// The traces of the scenes in `wanted`. Only those are held; of two for one row the later
 /// counts. What is no whole line of a trace (an interrupted run) is left out, and so is
 /// everything where there is no file.
@@ -134,10 +117,8 @@ mod tests {
             driven: vec![[1.5, -2.25, 0.125]],
         };
         let blocked = Trace { scene: "c".into(), method: "n3p".into(), ..Trace::default() };
-        let mut writer = TraceWriter::create(&path).unwrap();
-        for t in [&blocked, &trace, &blocked] {
-            writer.push(t).unwrap();
-        }
+        let lines = [&blocked, &trace, &blocked].map(|t| serde_json::to_string(t).unwrap() + "\n");
+        std::fs::write(&path, lines.concat()).unwrap();
         let all = HashSet::from([&trace.scene[..], "c"]);
         assert_eq!(read(&path, &all).unwrap(), [blocked.clone(), trace.clone()]);
         assert_eq!(read(&path, &HashSet::from(["c"])).unwrap(), std::slice::from_ref(&blocked));

@@ -26,7 +26,7 @@ use super::learning_curve;
 use super::stages::{Failure, Stages, Todo, settings};
 use crate::episode::Case;
 use crate::episode::Row;
-use crate::files::{reason, remove_leftovers, write_whole};
+use crate::files::{Keeper, keep, reason, remove_leftovers, write_whole};
 use crate::lab::dataset::schema::GIT_REVISION;
 use crate::lab::dataset::{CollectError, CollectOptions, Dataset, DatasetError, collect};
 use crate::lab::evaluation::report::Provenance;
@@ -163,7 +163,7 @@ pub fn run(
         // All that can be refused is, before anything is written.
         let ready = runner.ready()?;
         let trained = given::checksums(&runner.model_files())?;
-        runner.prepare(Some(&trained))?;
+        let _keeper = runner.prepare(Some(&trained))?;
         return runner.evaluate(ready, &settings(("models", trained)), &runner.known_curve());
     }
     let data = given.data.as_ref().map(|folder| given::data(config, folder)).transpose()?;
@@ -172,7 +172,7 @@ pub fn run(
         Models::load(files).map_err(|error| runner.model_error(error))?;
     }
     let policies = policies.map(|files| given::checksums(&files)).transpose()?;
-    runner.prepare(policies.as_deref())?;
+    let _keeper = runner.prepare(policies.as_deref())?;
     let (mut data_id, mut curve) = (String::new(), Vec::new());
     if config.learns() {
         data_id = match data {
@@ -234,9 +234,12 @@ impl Runner<'_> {
         self.model(&format!("mlp-{kind}.safetensors"))
     }
 
-    /// Makes the folders and records what is about to happen, with the checksums of models given.
-    fn prepare(&self, models: Option<&[String]>) -> Result<(), ExperimentError> {
+    /// Makes the folders, keeps them for this process and records what is about to happen, with the checksums
+    /// of models given.
+    fn prepare(&self, models: Option<&[String]>) -> Result<Keeper, ExperimentError> {
         self.make_folder(self.out.to_owned())?;
+        let keeper = keep(self.out)
+            .map_err(|error| ExperimentError::Io { path: self.out.to_owned(), error })?;
         self.make_folder(self.path("stages"))?;
         self.write("config.toml", self.config.to_toml())?;
         let run = serde_json::json!({
@@ -249,7 +252,8 @@ impl Runner<'_> {
             "policies": self.given.policies,
             "models_sha256": models,
         });
-        self.write("run.json", format!("{run:#}\n"))
+        self.write("run.json", format!("{run:#}\n"))?;
+        Ok(keeper)
     }
 
     /// Makes a folder, and removes what killed runs left in it.
@@ -510,7 +514,8 @@ impl Runner<'_> {
             Todo::GoOn => {}
             Todo::BeginAnew => remove(&rows_csv)?,
         }
-        let (mut outputs, mut rows) = Outputs::resume(self.out)?;
+        let (mut outputs, mut rows) =
+            Outputs::resume(self.out, None, &cases, &suite_config.methods)?;
         let bar = progress::bar((cases.len() * e.methods.len()) as u64, "evaluate");
         bar.set_position(rows.len() as u64);
         let new = suite::run(&cases, &models, &suite_config, rows.len(), |case, episode| {

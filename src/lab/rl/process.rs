@@ -8,7 +8,8 @@
 //! program prints to standard error appears as it is.
 //!
 //! Whatever the program does, the caller neither waits longer than the limit nor holds more than a
-//! few lines. After a fault the program is killed, the rest of the episode repeats the fault, and
+//! few lines. After a fault the program is killed, on Unix with whatever it started (all that is still in its
+//! process group), the rest of the episode repeats the fault, and
 //! the next episode starts the program anew. Otherwise one process serves all episodes.
 
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
@@ -156,6 +157,8 @@ impl Failure {
 #[derive(Debug)]
 struct Running {
     child: Child,
+    /// Whether it was waited for: its number may be another's by now.
+    ended: bool,
     questions: SyncSender<Vec<u8>>,
     lines: Receiver<Vec<u8>>,
 }
@@ -165,12 +168,15 @@ impl Running {
         let (program, arguments) = words.split_first().ok_or(ErrorKind::InvalidInput)?;
         let mut command = Command::new(program);
         command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped());
+        // A group of its own, so that what it starts ends with it.
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = command.spawn()?;
         let pipes = child.stdin.take().zip(child.stdout.take());
         let (questions, to_write) = sync_channel(1);
         let (read, lines) = sync_channel(1);
         // From here on dropping it kills the program, also where a thread cannot be had.
-        let running = Self { child, questions, lines };
+        let running = Self { child, ended: false, questions, lines };
         let (stdin, stdout) = pipes.ok_or(ErrorKind::BrokenPipe)?;
         thread::Builder::new().spawn(move || write_questions(stdin, &to_write))?;
         thread::Builder::new().spawn(move || read_lines(stdout, &read))?;
@@ -207,13 +213,24 @@ impl Running {
 
     /// Makes sure that it has ended, and says how it did.
     fn end(&mut self) -> String {
-        // One that has ended already cannot be killed, which is as good.
+        // What has ended already cannot be killed, which is as good.
+        #[cfg(unix)]
+        if let (false, Some(group)) = (self.ended, group_of(&self.child)) {
+            let _ = rustix::process::kill_process_group(group, rustix::process::Signal::KILL);
+        }
         let _ = self.child.kill();
+        self.ended = true;
         match self.child.wait() {
             Ok(status) => format!("it ended ({status})"),
             Err(error) => format!("it ended ({})", reason(&error)),
         }
     }
+}
+
+/// The process group that a child leads.
+#[cfg(unix)]
+fn group_of(child: &Child) -> Option<rustix::process::Pid> {
+    rustix::process::Pid::from_raw(child.id().try_into().ok()?)
 }
 
 impl Drop for Running {

@@ -247,6 +247,7 @@ impl Map {
             low: self.low.clone(),
             drivable_area: self.drivable_area.clone(),
             bounds: self.bounds,
+            ..Scene::default()
         };
         scene.validate(&self.path)?;
         if let Some(warning) = scene.degrees() {
