@@ -101,11 +101,14 @@ fn header(line: &str) -> Option<Vec<String>> {
 }
 
 pub(super) fn csv(text: &str, options: &MapOptions, file: MapFile) -> Result<Map, SceneError> {
-    let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()).peekable();
-    let names = lines.peek().and_then(|(_, line)| header(line));
+    // Blank lines before the first count as lines.
+    let head = text.len() - text.trim_start().len();
+    let mut at = text[..head].rfind('\n').map_or(0, |end| end + 1);
+    let first = text[at..].lines().next().unwrap_or_default();
+    let names = header(first);
     let (columns, count) = match &names {
         Some(names) => {
-            lines.next();
+            at += first.len();
             let column = |name: &str| names.iter().position(|n| n == name);
             let needed = |name: &str| {
                 let text = format!("is no column among {}; expected x and y", names.join(", "));
@@ -113,63 +116,77 @@ pub(super) fn csv(text: &str, options: &MapOptions, file: MapFile) -> Result<Map
             };
             ([needed("x")?, needed("y")?, column("z").unwrap_or(usize::MAX)], names.len())
         }
-        None => {
-            let count = lines.peek().map_or(0, |(_, line)| line.split(',').count());
-            ([0, 1, 2], count)
-        }
+        None => ([0, 1, 2], first.split(',').count()),
     };
     let has_z = columns[2] < count;
     let mut cloud = Cloud::new(options, text.len() / 16);
-    for (i, line) in lines {
-        let mut values = [0.0; 3];
-        let mut fields = 0;
-        for field in line.split(',') {
-            if let Some(value) = columns.iter().position(|&column| column == fields) {
-                values[value] = number(field).ok_or_else(|| {
-                    let field = field.trim();
-                    file.format(format!("line {} has {field:?}; expected a number", i + 1))
+    let mut values = vec![0.0; count];
+    while at < text.len() {
+        if let Some(end) = plain_row(text.as_bytes(), at, b',', &mut values) {
+            at = end;
+        } else {
+            let line = text[at..].lines().next().unwrap_or_default();
+            let number = || text[..at].matches('\n').count() + 1;
+            at += line.len();
+            // The line break, which may be two characters.
+            at += text[at..].find('\n').map_or(text.len() - at, |end| end + 1);
+            if line.trim().is_empty() {
+                continue;
+            }
+            let fields: Vec<&str> = line.split(',').collect();
+            if fields.len() != count {
+                let text =
+                    format!("line {} has {} fields; expected {count}", number(), fields.len());
+                return Err(file.format(text));
+            }
+            for column in columns.into_iter().filter(|&column| column < count) {
+                let field = fields[column].trim();
+                values[column] = field.parse().map_err(|_| {
+                    file.format(format!("line {} has {field:?}; expected a number", number()))
                 })?;
             }
-            fields += 1;
         }
-        if fields != count {
-            let text = format!("line {} has {fields} fields; expected {count}", i + 1);
-            return Err(file.format(text));
-        }
-        cloud.add(values[0], values[1], has_z.then_some(values[2]));
+        cloud.add(values[columns[0]], values[columns[1]], has_z.then(|| values[columns[2]]));
     }
     cloud.map(has_z, file)
 }
 
-/// A number in decimal digits. Most have so few that both the digits and the power of ten are exact, and so is their
-/// quotient but for one rounding; the others take the library's slower way to the same result.
-fn number(field: &str) -> Option<f64> {
+/// Reads a line of plain numbers, as many as there are `values`, and says where the next begins; `None` where a number is not
+/// plain. Those are of so few decimal digits that both the digits and the power of ten are exact, and so is their quotient
+/// but for one rounding: the same result as the library's, in a third of the time.
+fn plain_row(bytes: &[u8], from: usize, separator: u8, values: &mut [f64]) -> Option<usize> {
     const POWERS: [f64; 16] =
         [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
-    let (is_negative, digits) = match field.as_bytes() {
-        [b'-', digits @ ..] => (true, digits),
-        digits => (false, digits),
-    };
-    let (mut value, mut after, mut is_after) = (0_u64, 0, false);
-    let is_short = (1..=16).contains(&digits.len()) && digits[0].is_ascii_digit();
-    let is_plain = is_short
-        && digits.iter().all(|&b| match b {
-            b'0'..=b'9' => {
-                value = 10 * value + u64::from(b - b'0');
-                after += usize::from(is_after);
-                true
+    let (mut at, last) = (from, values.len().checked_sub(1)?);
+    for (i, value) in values.iter_mut().enumerate() {
+        let is_negative = bytes.get(at) == Some(&b'-');
+        at += usize::from(is_negative);
+        let begin = at;
+        let (mut digits, mut point) = (0_u64, None);
+        loop {
+            match *bytes.get(at)? {
+                b @ b'0'..=b'9' => {
+                    digits = digits.wrapping_mul(10).wrapping_add(u64::from(b - b'0'))
+                }
+                b'.' if point.is_none() && at > begin => point = Some(at),
+                _ => break,
             }
-            b'.' if !is_after => {
-                is_after = true;
-                true
-            }
-            _ => false,
-        });
-    if is_plain && value < 1 << 53 && after < POWERS.len() {
-        let value = value as f64 / POWERS[after];
-        return Some(if is_negative { -value } else { value });
+            at += 1;
+        }
+        if !(1..=16).contains(&(at - begin)) || digits >= 1 << 53 {
+            return None;
+        }
+        let after = point.map_or(0, |point| at - point - 1);
+        let size = digits as f64 / POWERS[after];
+        *value = if is_negative { -size } else { size };
+        match (i == last, bytes[at]) {
+            (false, b) if b == separator => at += 1,
+            (true, b'\n') => at += 1,
+            (true, b'\r') if bytes.get(at + 1) == Some(&b'\n') => at += 2,
+            _ => return None,
+        }
     }
-    field.trim().parse().ok()
+    Some(at)
 }
 
 /// One field of a point in a PCD file.
@@ -209,26 +226,34 @@ pub(super) fn pcd(bytes: &[u8], options: &MapOptions, file: MapFile) -> Result<M
         "ascii" => {
             let text = str::from_utf8(body)
                 .map_err(|_| file.format("is not text (UTF-8) after DATA ascii"))?;
-            let lines = text.lines().filter(|line| !line.trim().is_empty());
-            let mut count = 0;
-            for line in lines.take(head.points) {
-                let fields: Vec<&str> = line.split_ascii_whitespace().collect();
-                if fields.len() != head.values {
-                    let text = format!(
-                        "point {count} has {} values; expected {}",
-                        fields.len(),
-                        head.values
-                    );
-                    return Err(file.format(text));
+            let (mut at, mut count, mut values) = (0, 0, vec![0.0; head.values]);
+            while at < text.len() && count < head.points {
+                if let Some(end) = plain_row(body, at, b' ', &mut values) {
+                    at = end;
+                } else {
+                    let line = text[at..].split('\n').next().unwrap_or_default();
+                    at += line.len() + 1;
+                    let fields: Vec<&str> = line.split_ascii_whitespace().collect();
+                    if fields.is_empty() {
+                        continue;
+                    }
+                    if fields.len() != head.values {
+                        let text = format!(
+                            "point {count} has {} values; expected {}",
+                            fields.len(),
+                            head.values
+                        );
+                        return Err(file.format(text));
+                    }
+                    for column in head.columns.into_iter().flatten() {
+                        let field = fields[column];
+                        values[column] = field.parse().map_err(|_| {
+                            file.format(format!("point {count} has {field:?}; expected a number"))
+                        })?;
+                    }
                 }
-                let value = |axis: usize| {
-                    head.columns[axis].map_or(Ok(0.0), |column| {
-                        let text =
-                            format!("point {count} has {:?}; expected a number", fields[column]);
-                        number(fields[column]).ok_or_else(|| file.format(text))
-                    })
-                };
-                cloud.add(value(0)?, value(1)?, has_z.then_some(value(2)?));
+                let [x, y, z] = head.columns.map(|column| column.map(|column| values[column]));
+                cloud.add(x.unwrap_or(f64::NAN), y.unwrap_or(f64::NAN), z);
                 count += 1;
             }
             if count < head.points {
@@ -328,8 +353,12 @@ fn pcd_head<'a>(bytes: &'a [u8], file: MapFile) -> Result<(Head<'a>, usize), Sce
             return Err(file.invalid(key, text));
         }
     }
-    if let Some(&count) = counts.iter().find(|&&count| count > 1 << 16) {
-        return Err(file.invalid("COUNT", format!("is {count}; expected at most 65536")));
+    // More would be no point, and room for them is set aside.
+    const MOST: usize = 1 << 16;
+    let total = counts.iter().fold(0_usize, |sum, &count| sum.saturating_add(count));
+    if total > MOST {
+        let text = format!("is {total} values in all; expected at most {MOST}");
+        return Err(file.invalid("COUNT", text));
     }
     let kind = |i: usize| kinds[i].as_bytes().first().copied().unwrap_or_default();
     for (i, &size) in sizes.iter().enumerate() {
@@ -439,8 +468,19 @@ mod tests {
 
     proptest! {
         #[test]
-        fn numbers_are_read_as_the_library_reads_them(text in "-?[0-9]{1,12}(\\.[0-9]{0,12})?") {
-            prop_assert_eq!(number(&text).map(f64::to_bits), text.parse().ok().map(f64::to_bits));
+        fn plain_numbers_are_read_as_the_library_reads_them(
+            texts in proptest::collection::vec("-?[0-9]{1,9}(\\.[0-9]{0,9})?", 1..5),
+        ) {
+            let mut values = vec![0.0; texts.len()];
+            let line = texts.join(",") + "\r\n";
+            if let Some(end) = plain_row(line.as_bytes(), 0, b',', &mut values) {
+                prop_assert_eq!(end, line.len());
+                let bits: Vec<u64> = values.iter().map(|v| v.to_bits()).collect();
+                let parsed = texts.iter().map(|text| text.parse::<f64>().unwrap().to_bits());
+                prop_assert_eq!(bits, parsed.collect::<Vec<_>>());
+            } else {
+                prop_assert!(texts.iter().any(|text| text.trim_start_matches('-').len() > 15));
+            }
         }
 
         #[test]
@@ -455,10 +495,10 @@ mod tests {
     fn packings_are_unpacked() {
         // Three letters, then nine more that repeat them.
         assert_eq!(unpack(&[2, b'a', b'b', b'c', 0xE0, 0, 2], 12).unwrap(), b"abcabcabcabc");
-        for text in ["1e3", " 2.5 ", "+4", ".5", "12345678901234567890.5"] {
-            assert_eq!(number(text), text.trim().parse().ok(), "{text}");
+        // What is not plain is left to the library.
+        for line in ["1e3\n", " 2.5\n", ".5\n", "nan\n", "1", "1,2\n", "\n", "-\n", "1..2\n"] {
+            assert_eq!(plain_row(line.as_bytes(), 0, b',', &mut [0.0]), None, "{line}");
         }
-        assert!(number("NaN").unwrap().is_nan() && number("x").is_none() && number("").is_none());
     }
 
     #[test]

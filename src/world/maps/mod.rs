@@ -240,7 +240,8 @@ impl Map {
             goal,
             goals: if goals.len() > 1 { goals } else { Vec::new() },
             goal_tolerance: self.goal_tolerance,
-            parking_type: self.parking_type,
+            // It says how the map's own goal lies.
+            parking_type: self.parking_type.filter(|_| request.goals.is_empty()),
             obstacles: self.obstacles.clone(),
             polylines: self.polylines.clone(),
             points: self.points.clone(),
@@ -262,6 +263,8 @@ impl Map {
         }
         if !request.goals.is_empty() {
             self.goals = request.goals.iter().map(|&goal| Place::RearAxle(goal)).collect();
+            // It said how the map's own goal lies.
+            self.parking_type = None;
         }
         if let Some(vehicle) = request.vehicle {
             // Another car has another outline.
