@@ -2,6 +2,7 @@
 
 import copy
 import hashlib
+import json
 import pickle
 
 import numpy as np

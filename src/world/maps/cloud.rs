@@ -64,7 +64,7 @@ impl Cloud {
         }
         if has_z && !is_limited && self.seen[1] - self.seen[0] > 0.05 {
             tracing::info!(
-                "{}: heights from {} to {} m all count as obstacles; limit them if the ground is among them",
+                "{}: heights from {} to {} m all count as obstacles; limit them (--z-min, --z-max) if the ground is among them",
                 file.path.display(),
                 self.seen[0],
                 self.seen[1]
