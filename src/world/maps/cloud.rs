@@ -54,7 +54,7 @@ impl Cloud {
         }
         if self.points.is_empty() {
             let why = match (self.outside, self.not_finite) {
-                (0, _) => "of which is finite".to_owned(),
+                (0, _) => "that is finite".to_owned(),
                 _ => format!(
                     "from z = {low} to {high} m; those there lie from {} to {}",
                     self.seen[0], self.seen[1]
