@@ -2,6 +2,7 @@
 
 import copy
 import hashlib
+import json
 import pickle
 
 import numpy as np
@@ -173,3 +174,28 @@ def test_rows_go_into_tables(library):
 def test_what_cannot_be_evaluated_is_said(scenes, options, told):
     with pytest.raises(n3p.BadInput, match=told):
         n3p.evaluate(scenes, **options)
+
+
+def test_maps_become_scenes():
+    fixtures = ROOT / "tests/fixtures/maps"
+    lot = n3p.load_map(fixtures / "lot.geojson")
+    assert lot.vehicle.length == 4.69 and len(lot["obstacles"]) == 1
+    cloud = n3p.load_map(
+        fixtures / "cloud.csv", start=(0, 0, 0), goal=(5, 0, 0), heights=(0.5, 2.0)
+    )
+    assert cloud["points"] == [[1.5, 2.25], [-3.125, 4.0]]
+    floor = n3p.load_map(
+        ROOT / "examples/maps/shop-floor.yaml",
+        start=(0, 12, 0),
+        goals=[(12.3, 0.2, 1.5708)],
+        vehicle=json.loads((ROOT / "examples/maps/tugger.json").read_text()),
+    )
+    assert floor["drivable_area"]["outer"][0] == [-2.0, -1.0]
+    for wrong in (
+        lambda: n3p.load_map(fixtures / "lot.yaml"),
+        lambda: n3p.load_map(fixtures / "none.yaml"),
+        lambda: n3p.load_map(fixtures / "lot.yaml", unknown="maybe"),
+        lambda: n3p.load_map(fixtures / "lot.yaml", start=(0, 0, 0), goal=(1, 0)),
+    ):
+        with pytest.raises(n3p.BadInput):
+            wrong()

@@ -135,8 +135,9 @@ impl Args {
             }
             return Ok((file, Scene::read(file).or_bad_input()?, None));
         };
+        let request = self.maps.request()?;
         let map = self.maps.read(file)?;
-        let scene = map.scene(&self.maps.request()?).or_bad_input()?;
+        let scene = map.scene(&request).or_bad_input()?;
         Ok((file, scene, map.geographic))
     }
 

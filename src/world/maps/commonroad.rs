@@ -92,7 +92,9 @@ impl Reader<'_> {
     fn length(&self, of: Element, name: &str) -> Result<f64, SceneError> {
         match self.number(of, name)? {
             v if v > 0.0 => Ok(v),
-            v => Err(self.file.invalid(field(of), format!("has {name} {v}; expected more than 0"))),
+            v => {
+                Err(self.file.invalid(field(of), format!("has {name} {v:?}; expected more than 0")))
+            }
         }
     }
 

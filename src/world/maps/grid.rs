@@ -39,12 +39,12 @@ pub(super) fn read(text: &str, options: &MapOptions, file: MapFile) -> Result<Ma
     };
     let share = |key: &str| {
         let v = number(key)?;
-        let wrong = || file.invalid(key, format!("is {v}; expected a number from 0 to 1"));
+        let wrong = || file.invalid(key, format!("is {v:?}; expected a number from 0 to 1"));
         if (0.0..=1.0).contains(&v) { Ok(v) } else { Err(wrong()) }
     };
     let resolution = number("resolution")?;
     if !(1e-4..=100.0).contains(&resolution) {
-        let text = format!("is {resolution}; expected metres per pixel, 0.0001 to 100");
+        let text = format!("is {resolution:?}; expected metres per pixel, 0.0001 to 100");
         return Err(file.invalid("resolution", text));
     }
     let origin = origin(&keys, file)?;

@@ -1,7 +1,7 @@
 //! Maps: what people have of the place to park in, read into what a [`Scene`] holds.
 //!
 //! A map may lack what a scene needs: start, goal and vehicle. [`Map::read`] takes any file there is a reader for, and
-//! [`Map::scene`] adds what is missing. In reading order: `cloud` (points), `geojson` with `geographic` (from WGS-84 to
+//! [`Map::scene`] adds what is missing. In reading order: `cloud` and `pcd` (points), `geojson` with `rings` and `geographic` (from WGS-84 to
 //! metres and back); with the feature `maps` also `grid` with `image` and `cells` (occupancy grids), `commonroad` and
 //! `opendrive` with `xml`. Scene files are maps as well. The formats are described in `docs/formats.md`.
 
@@ -18,6 +18,8 @@ mod grid;
 mod image;
 #[cfg(feature = "maps")]
 mod opendrive;
+mod pcd;
+mod rings;
 #[cfg(feature = "maps")]
 mod xml;
 
@@ -165,7 +167,7 @@ impl Map {
         let read = || fs::read(path).map_err(|error| SceneError::Read { path: path.into(), error });
         let mut map = match &ending.to_ascii_lowercase()[..] {
             "yaml" | "yml" => file.grid(&file.text(read()?)?, options)?,
-            "pcd" => cloud::pcd(&read()?, options, file)?,
+            "pcd" => pcd::read(&read()?, options, file)?,
             "csv" => {
                 let text = file.text(read()?)?;
                 match cloud::is_cloud(&text) {
@@ -240,7 +242,8 @@ impl Map {
             goal,
             goals: if goals.len() > 1 { goals } else { Vec::new() },
             goal_tolerance: self.goal_tolerance,
-            parking_type: self.parking_type,
+            // It says how the map's own goal lies.
+            parking_type: self.parking_type.filter(|_| request.goals.is_empty()),
             obstacles: self.obstacles.clone(),
             polylines: self.polylines.clone(),
             points: self.points.clone(),
@@ -263,6 +266,8 @@ impl Map {
         }
         if !request.goals.is_empty() {
             self.goals = request.goals.iter().map(|&goal| Place::RearAxle(goal)).collect();
+            // It said how the map's own goal lies.
+            self.parking_type = None;
         }
         if let Some(vehicle) = request.vehicle {
             // Another car has another outline.

@@ -90,7 +90,7 @@ impl Reader<'_> {
             let length = number("length")?;
             let from = Pose::new(number("x")?, number("y")?, number("hdg")?);
             if !(0.0..1e6).contains(&length) {
-                let text = format!("has length {length}; expected metres from 0");
+                let text = format!("has length {length:?}; expected metres from 0");
                 return Err(self.file.invalid(field(geometry), text));
             }
             let Some(shape) = geometry.children().find(Element::is_element) else {
