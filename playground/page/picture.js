@@ -200,10 +200,12 @@ const picture = (() => {
     const group = layer("swept");
     group.replaceChildren();
     if (!path) return;
+    // Finer once it stays.
+    const apart = vehicle.length * (edit.dragging ? 0.06 : 0.02);
     let d = "";
     let last = null;
     for (const pose of path.poses) {
-      if (last && distance(pose, last) + Math.abs(pose[2] - last[2]) * vehicle.length / 2 < vehicle.length * 0.05) continue;
+      if (last && distance(pose, last) + Math.abs(pose[2] - last[2]) * vehicle.length / 2 < apart) continue;
       last = pose;
       d += `M${text(footprint(vehicle, pose)).replaceAll(" ", "L")}Z`;
     }
