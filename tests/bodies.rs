@@ -1,8 +1,6 @@
 //! What people's scenes say beyond polygons and one rectangle: polylines, a drivable area, what is low, contours and
 //! margins for each side.
 
-mod fixtures;
-
 use std::f64::consts::FRAC_PI_2;
 
 use n3p::curves::Segment;

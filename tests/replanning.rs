@@ -1,7 +1,5 @@
 //! Planning again and again on the way: the wheels as they stand, and the path that the car follows already.
 
-mod fixtures;
-
 use n3p::curves::TrajectoryLimits;
 use n3p::curves::smoothing::StandstillSteering;
 use n3p::geometry::Pose;

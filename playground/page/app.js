@@ -197,9 +197,14 @@ function showVehicle() {
   $("vehicle").value = at;
 }
 
-async function load(file) {
+/** Loads a map; of several files those that are images belong to the other. */
+async function load(given) {
+  const isImage = (file) => /\.(pgm|png)$/i.test(file.name);
+  const list = [...given].sort((a, b) => isImage(a) - isImage(b));
   try {
-    put(await files.read(file.name, new Uint8Array(await file.arrayBuffer())));
+    const held = await Promise.all(list.map(async (f) => ({ name: f.name, bytes: new Uint8Array(await f.arrayBuffer()) })));
+    const [{ name, bytes }, ...others] = held;
+    put(await files.read(name, bytes, others, lot.scene.vehicle));
   } catch (e) {
     say(notice = e.message);
   }
@@ -267,7 +272,7 @@ function listen() {
   });
   on("load", "click", () => $("file").click());
   on("file", "change", () => {
-    if ($("file").files[0]) load($("file").files[0]);
+    if ($("file").files[0]) load($("file").files);
     $("file").value = "";
   });
   on("save", "click", () => files.offer(`${lot.scene.name || "scene"}.json`, `${JSON.stringify(lot.scene)}\n`));
@@ -277,7 +282,7 @@ function listen() {
   window.addEventListener("dragover", (event) => event.preventDefault());
   window.addEventListener("drop", (event) => {
     event.preventDefault();
-    if (event.dataTransfer.files[0]) load(event.dataTransfer.files[0]);
+    if (event.dataTransfer.files[0]) load(event.dataTransfer.files);
   });
   window.addEventListener("hashchange", showLink);
   document.addEventListener("keydown", keys);

@@ -30,10 +30,12 @@ const files = (() => {
   /** Longest link that browsers and messengers are known to take, characters. */
   const LONGEST = 60000;
 
-  /** The scene of a file, read by the planner; throws in plain words. */
-  async function read(name, bytes) {
-    if (bytes.length > LARGEST) throw new Error(`${name} has ${(bytes.length / 1e6).toFixed(0)} MB; expected at most 14`);
-    const { scene, error } = await planner.ask({ load: { name, bytes: base64(bytes) } });
+  /** The scene of a file, read by the planner, with the files that it may name; throws in plain words. */
+  async function read(name, bytes, others = [], vehicle = null) {
+    const size = others.reduce((sum, other) => sum + other.bytes.length, bytes.length);
+    if (size > LARGEST) throw new Error(`${name} has ${(size / 1e6).toFixed(0)} MB; expected at most 14`);
+    const packed = others.map((other) => ({ name: other.name, bytes: base64(other.bytes) }));
+    const { scene, error } = await planner.ask({ load: { name, bytes: base64(bytes), others: packed, vehicle } });
     if (error) throw new Error(error.message);
     return scene;
   }

@@ -25,6 +25,8 @@ const picture = (() => {
     }
     return known.get(points);
   };
+  /** Chains of points as one path, each closed or not. */
+  const chains = (lists, end = "") => lists.map((list) => `M${list.map(([x, y]) => `${x} ${y}`).join("L")}${end}`).join("");
   const text = (points) => points.map(([x, y]) => `${+x.toFixed(4)},${+y.toFixed(4)}`).join(" ");
   const line = (poses) => `M${poses.map(([x, y]) => `${+x.toFixed(3)} ${+y.toFixed(3)}`).join("L")}`;
   const transform = ([x, y, turn]) => `translate(${x} ${y}) rotate(${turn * 180 / Math.PI})`;
@@ -173,6 +175,11 @@ const picture = (() => {
       drawnPoints = scene.points;
       layer("points").setAttribute("d", (scene.points ?? []).map(([x, y]) => `M${x} ${y}h0`).join(""));
     }
+    const { obstacles: solids = [], polylines = [], points = [] } = scene.low ?? {};
+    const area = scene.drivable_area;
+    layer("walls").setAttribute("d", chains(scene.polylines ?? []));
+    layer("low").setAttribute("d", chains(solids, "Z") + chains(polylines) + points.map(([x, y]) => `M${x} ${y}h0`).join(""));
+    layer("area").setAttribute("d", area ? chains([area.outer, ...(area.holes ?? [])], "Z") : "");
     const bounds = layer("bounds");
     bounds.toggleAttribute("hidden", !scene.bounds);
     if (scene.bounds) {

@@ -92,6 +92,6 @@ function withVehicle(scene, vehicle) {
 
 /** Nothing but the car and its goal. */
 const emptied = (scene) => {
-  const { points, ...rest } = scene;
+  const { points, polylines, low, drivable_area, previous, ...rest } = scene;
   return { ...rest, obstacles: [], name: "mine", source: "drawn in the playground", parking_type: null, bounds: null };
 };

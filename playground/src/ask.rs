@@ -4,21 +4,25 @@
 //! | request | answer |
 //! |---|---|
 //! | `{"catalogue": {}}` | `{"methods": […], "vehicles": […], "examples": […], "version": …}` |
-//! | `{"load": {"name": "lot.json", "bytes": BASE64}}` | `{"scene": …}` |
+//! | `{"load": {"name": "lot.yaml", "bytes": BASE64, "others": [{"name": "lot.pgm", "bytes": BASE64}]}}` | `{"scene": …}` |
 //! | `{"plan": {"scene": …, "methods": ["n3p"], "wish": {…}}}` | `{"plans": [one for each method]}` |
 //!
 //! What cannot be answered is `{"error": {"field": …, "message": …, "touches": …}}`: the field of the scene or of
 //! the request that is wrong, if it is one, in plain words what is, and the obstacle that start or goal touch.
 
 use std::cell::RefCell;
+use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
+use n3p::Vehicle;
+use n3p::geometry::Pose;
 use n3p::planners::{Conflict, ProblemError};
+use n3p::world::Scene;
+use n3p::world::maps::{Map, MapOptions, MapRequest};
 use n3p::world::scene::SceneError;
-use n3p::world::{Scene, tpcap};
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 use serde_json::{Value, json};
@@ -42,6 +46,20 @@ struct Load {
     /// Its name, whose ending says what it is.
     name: String,
     /// What it holds, in base64.
+    bytes: String,
+    /// Files that it may name, such as the image of an occupancy grid.
+    #[serde(default)]
+    others: Vec<Other>,
+    /// Who parks where the file does not say it.
+    #[serde(default)]
+    vehicle: Option<Vehicle>,
+}
+
+/// One more file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Other {
+    name: String,
     bytes: String,
 }
 
@@ -162,26 +180,31 @@ fn respond(request: &str, desk: &mut Desk) -> Result<Value, Failure> {
     }
 }
 
-/// The scene that a file holds. Further formats, such as maps of occupied cells, go in here.
+/// The scene that a file holds, any map that [`Map`] reads. A map that does not say where the car stands gets a start and a
+/// goal about its middle, to be moved.
 fn load(file: &Load) -> Result<Scene, Failure> {
-    let wrong = |message: &str| Failure::of(Some(&file.name), format!("{}: {message}", file.name));
-    let bytes = BASE64_STANDARD.decode(&file.bytes).map_err(|_| wrong("is not whole base64"))?;
-    let path = Path::new(&file.name);
-    let text = || {
-        let text = String::from_utf8(bytes).map_err(|_| wrong("is not text; expected a scene"))?;
-        match text.trim_start_matches('\u{feff}') {
-            empty if empty.trim().is_empty() => Err(wrong("is empty; expected a scene")),
-            text => Ok(text.to_owned()),
-        }
+    let of = |name: &str, message: &str| Failure::of(Some(name), format!("{name}: {message}"));
+    let decoded = |name: &str, bytes: &str| {
+        BASE64_STANDARD.decode(bytes).map_err(|_| of(name, "is not whole base64"))
     };
-    let mut scene = match path.extension().and_then(|e| e.to_str()) {
-        Some("json") => Scene::from_json(&text()?, path)?,
-        Some("csv") => tpcap::parse(&text()?, path)?,
-        _ => return Err(wrong("expected a scene, .json, or a case of TPCAP, .csv")),
-    };
-    if scene.name.is_empty() {
-        scene.name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let mut files = vec![(PathBuf::from(&file.name), decoded(&file.name, &file.bytes)?)];
+    for Other { name, bytes } in &file.others {
+        files.push((PathBuf::from(name), decoded(name, bytes)?));
     }
-    scene.validate(path)?;
-    Ok(scene)
+    let held = |path: &Path| {
+        let found = files.iter().find(|(name, _)| name.file_name() == path.file_name());
+        found.map(|(_, bytes)| bytes.clone()).ok_or_else(|| io::ErrorKind::NotFound.into())
+    };
+    let map = Map::of_files(Path::new(&file.name), &MapOptions::default(), &held)?;
+    let vehicle = map.vehicle.or(file.vehicle).unwrap_or_default();
+    let [x0, y0, x1, y1] = map.extent().unwrap_or([-10.0, -5.0, 10.0, 5.0]);
+    let middle = Pose::new(f64::midpoint(x0, x1), f64::midpoint(y0, y1), 0.0);
+    let beside = |lengths: f64| Some(middle.shifted(lengths * vehicle.length));
+    let has_goal = !(map.goals.is_empty() && map.spots.is_empty());
+    let request = MapRequest {
+        start: beside(-1.0).filter(|_| map.start.is_none()),
+        goals: beside(1.0).filter(|_| !has_goal).into_iter().collect(),
+        vehicle: Some(vehicle),
+    };
+    Ok(map.scene(&request)?)
 }

@@ -18,8 +18,34 @@ pub struct Clearance {
     pub on_the_way: Option<f64>,
 }
 
+/// What `measure` finds for a scene, among what is near its path where there is very much else: the same, and sooner.
+pub fn measured<E>(
+    scene: &Scene,
+    path: &PathFile,
+    measure: impl Fn(&Scene) -> Result<Clearance, E>,
+) -> Result<Clearance, E> {
+    /// Vehicle lengths: what is farther than that is looked for among everything.
+    const NEAR: f64 = 3.0;
+    let reach = NEAR * scene.vehicle.length;
+    let poses = path.poses.iter().map(|&[x, y, _]| Vec2::new(x, y));
+    let area = Aabb::around(poses).inflated(reach + scene.vehicle.reach());
+    if let Some(near) = scene.within(&area)
+        && let Ok(found) = measure(&near)
+        && found.least.max(found.on_the_way.unwrap_or(0.0)) <= reach
+    {
+        return Ok(found);
+    }
+    measure(scene)
+}
+
 /// How near `path` comes to the obstacles of its scene, over its poses.
 pub fn of(scene: &Scene, path: &PathFile) -> Clearance {
+    let measure = |scene: &Scene| Ok::<_, std::convert::Infallible>(among(scene, path));
+    let Ok(found) = measured(scene, path, measure);
+    found
+}
+
+fn among(scene: &Scene, path: &PathFile) -> Clearance {
     let body = scene.vehicle.footprint(0.0);
     let wheels = scene.vehicle.wheel_box(0.0);
     let contour: Vec<Vec2> = scene.contour.iter().map(|&[x, y]| Vec2::new(x, y)).collect();

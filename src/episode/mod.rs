@@ -5,7 +5,7 @@ pub mod comparison;
 mod row;
 mod spot_report;
 
-pub use clearance::{Clearance, WAY_ENDS};
+pub use clearance::{Clearance, WAY_ENDS, measured};
 pub use comparison::{CHANGE_M, FLOOR_M, fill};
 pub use row::Row;
 pub use spot_report::{SpotReport, abstraction, regions};

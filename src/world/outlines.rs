@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::scene::InvalidField;
 use super::{ObstacleError, Obstacles, Scene};
-use crate::geometry::{Polygon, Polyline, Pose, Vec2, is_within};
+use crate::geometry::{Aabb, Polygon, Polyline, Pose, Vec2, is_within};
 
 /// What only wheels must keep off, such as kerbs and wheel stops: the body passes over it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -166,6 +166,38 @@ impl Scene {
             std::iter::once(border).chain(holes)
         });
         listed(&self.obstacles, &self.polylines, &[], false).chain(area)
+    }
+
+    /// The same scene without what lies outside of `area`; the drivable area stays as it is. `None` where there is too
+    /// little for that to save time.
+    pub fn within(&self, area: &Aabb) -> Option<Scene> {
+        const FEW: usize = 5000;
+        let count = |lists: &[Vec<[f64; 2]>]| lists.iter().map(Vec::len).sum::<usize>();
+        let LowObstacles { obstacles, polylines, points } = &self.low;
+        let lists = [&self.obstacles, &self.polylines, obstacles, polylines].map(|l| count(l));
+        if lists.iter().sum::<usize>() + self.points.len() + points.len() <= FEW {
+            return None;
+        }
+        let vec = |&[x, y]: &[f64; 2]| Vec2::new(x, y);
+        let some = |points: &[[f64; 2]]| -> Vec<[f64; 2]> {
+            points.iter().copied().filter(|p| area.contains(vec(p))).collect()
+        };
+        let is_near = |list: &&Vec<[f64; 2]>| Aabb::around(list.iter().map(vec)).intersects(area);
+        let near = |lists: &[Vec<[f64; 2]>]| lists.iter().filter(is_near).cloned().collect();
+        let (obstacles, polylines, points) = (near(obstacles), near(polylines), some(points));
+        Some(Scene {
+            name: self.name.clone(),
+            source: self.source.clone(),
+            contour: self.contour.clone(),
+            goals: self.goals.clone(),
+            previous: None,
+            obstacles: near(&self.obstacles),
+            polylines: near(&self.polylines),
+            points: some(&self.points),
+            low: LowObstacles { obstacles, polylines, points },
+            drivable_area: self.drivable_area.clone(),
+            ..*self
+        })
     }
 
     /// Whether the middle of the car at `pose` lies within the drivable area, if there is one.

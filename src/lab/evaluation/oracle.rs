@@ -19,7 +19,7 @@ use parry2d_f64::utils::point_in_poly2d;
 
 use self::body::{Body, Extent, Motion, Solid, State};
 use self::contact::Contacts;
-use crate::episode::{Clearance, Judge, WAY_ENDS};
+use crate::episode::{Clearance, Judge, WAY_ENDS, measured};
 use crate::geometry::Pose;
 use crate::output::PathFile;
 use crate::vehicle::Vehicle;
@@ -189,7 +189,7 @@ pub fn measure(
     share: Option<f64>,
     contact_m: f64,
 ) -> Result<Clearance, Violation> {
-    Oracle::new(scene).check(path, share, contact_m)
+    measured(scene, path, |scene| Oracle::new(scene).check(path, share, contact_m))
 }
 
 /// The arc over a chord: c = 2/κ · sin(κ s / 2).

@@ -75,7 +75,7 @@ pub(super) fn read(text: &str, options: &MapOptions, file: MapFile) -> Result<Ma
     let image = value("image")?;
     let at = file.path.parent().unwrap_or(Path::new("")).join(image);
     let unusable = |message: String| file.invalid("image", format!("{image} {message}"));
-    let bytes = fs::read(&at).map_err(|e| {
+    let bytes = (file.bytes)(&at).map_err(|e| {
         unusable(format!("cannot be read: {}; expected a PGM or PNG file", reason(&e)))
     })?;
     let cells = Cells::read(bytes, |pixel| rule.is_blocked(pixel)).map_err(unusable)?;

@@ -23,8 +23,8 @@ mod rings;
 #[cfg(feature = "maps")]
 mod xml;
 
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 pub use geographic::Geographic;
 pub(crate) use geojson_file::{collection, feature, line_string, point};
@@ -32,7 +32,7 @@ pub(crate) use geojson_file::{collection, feature, line_string, point};
 use super::goals::GoalTolerance;
 use super::scene::{SceneError, stem};
 use super::scene_file::parse_json;
-use super::{DrivableArea, LowObstacles, ParkingType, Scene, tpcap};
+use super::{DrivableArea, LowObstacles, ParkingType, PreviousPath, Scene, tpcap};
 use crate::geometry::Pose;
 use crate::vehicle::{Margins, Vehicle};
 
@@ -51,6 +51,10 @@ pub struct Map {
     pub margins: Option<Margins>,
     /// Where the car starts, where the map says.
     pub start: Option<Place>,
+    /// Angle of the front wheels there, radians.
+    pub start_steer: f64,
+    /// The path that the car follows already, if there is one.
+    pub previous: Option<PreviousPath>,
     /// Where the car may park, where the map says.
     pub goals: Vec<Place>,
     /// Marked places to park in. They are goals where nothing else is.
@@ -162,9 +166,18 @@ impl Map {
 
     /// Reads a map of any known format, told by the ending of its name and its first words.
     pub fn read_with(path: &Path, options: &MapOptions) -> Result<Map, SceneError> {
-        let file = MapFile { path };
+        Self::of_files(path, options, &|path| fs::read(path))
+    }
+
+    /// The same where `bytes` says what files hold: the one at `path`, and of occupancy grids the image beside it.
+    pub fn of_files(
+        path: &Path,
+        options: &MapOptions,
+        bytes: &dyn Fn(&Path) -> io::Result<Vec<u8>>,
+    ) -> Result<Map, SceneError> {
+        let file = MapFile { path, bytes };
         let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-        let read = || fs::read(path).map_err(|error| SceneError::Read { path: path.into(), error });
+        let read = || bytes(path).map_err(|error| SceneError::Read { path: path.into(), error });
         let mut map = match &ending.to_ascii_lowercase()[..] {
             "yaml" | "yml" => file.grid(&file.text(read()?)?, options)?,
             "pcd" => pcd::read(&read()?, options, file)?,
@@ -212,6 +225,7 @@ impl Map {
         let vehicle = request.vehicle.or(self.vehicle);
         let vehicle = vehicle.ok_or_else(|| missing("vehicle", "--vehicle FILE"))?;
         let start = self.start.map(|place| place.rear_axle(&vehicle));
+        let is_own = request.start.is_none();
         let start = request.start.or(start);
         let start = start.ok_or_else(|| missing("start", "--start X,Y,HEADING"))?;
         let mut goals = request.goals.clone();
@@ -250,7 +264,8 @@ impl Map {
             low: self.low.clone(),
             drivable_area: self.drivable_area.clone(),
             bounds: self.bounds,
-            ..Scene::default()
+            start_steer: if is_own { self.start_steer } else { 0.0 },
+            previous: self.previous.clone().filter(|_| is_own),
         };
         scene.validate(&self.path)?;
         if let Some(warning) = scene.degrees() {
@@ -308,6 +323,8 @@ impl From<Scene> for Map {
             contour: scene.contour,
             margins: scene.margins,
             start: Some(Place::RearAxle(scene.start)),
+            start_steer: scene.start_steer,
+            previous: scene.previous,
             goals,
             goal_tolerance: scene.goal_tolerance,
             parking_type: scene.parking_type,
@@ -326,6 +343,8 @@ impl From<Scene> for Map {
 #[derive(Clone, Copy)]
 struct MapFile<'a> {
     path: &'a Path,
+    /// What files hold.
+    bytes: &'a dyn Fn(&Path) -> io::Result<Vec<u8>>,
 }
 
 impl MapFile<'_> {
