@@ -57,8 +57,11 @@ impl Kept {
     #[inline]
     fn is_hit(&self, start: &BodyFrame, sweep: &Sweep, a: Vec2, b: Vec2) -> bool {
         let (a, b) = (start.local(a), start.local(b));
-        let is_swept = |contour: &Contour| contour.sweeps(sweep.segment(), a, b);
-        sweep.hits(a, b) && self.contour.as_ref().is_none_or(is_swept)
+        match &self.contour {
+            None => sweep.hits(a, b),
+            // What lies in the rectangle all along is met by none of its sides.
+            Some(contour) => sweep.is_near(a, b) && contour.sweeps(sweep.segment(), a, b),
+        }
     }
 
     /// Whether the motion along `segment` touches nothing.

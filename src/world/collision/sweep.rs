@@ -116,18 +116,23 @@ impl Sweep {
         &self.aabb
     }
 
+    /// Whether the segment `a`–`b` is not wholly on one side of the box around the swept region.
+    #[inline]
+    pub fn is_near(&self, a: Vec2, b: Vec2) -> bool {
+        let Aabb { min, max } = &self.aabb;
+        !((a.x < min.x && b.x < min.x)
+            || (a.x > max.x && b.x > max.x)
+            || (a.y < min.y && b.y < min.y)
+            || (a.y > max.y && b.y > max.y))
+    }
+
     /// Whether the sweep meets the obstacle segment `a`–`b` (a point when equal), given in
     /// the frame of the vehicle at the start, where the footprint must be free of it.
     ///
     /// Of the two ends only `a` is tested as a corner of its own: in a polygon's boundary
     /// every vertex is the `a` of one edge.
     pub fn hits(&self, a: Vec2, b: Vec2) -> bool {
-        let Aabb { min, max } = &self.aabb;
-        if (a.x < min.x && b.x < min.x)
-            || (a.x > max.x && b.x > max.x)
-            || (a.y < min.y && b.y < min.y)
-            || (a.y > max.y && b.y > max.y)
-        {
+        if !self.is_near(a, b) {
             return false;
         }
         match &self.shape {
