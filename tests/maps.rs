@@ -309,7 +309,7 @@ fn a_plan_is_the_same_whichever_way_the_scene_came() {
     scene(&["convert", &map, &at("scene.json"), "--vehicle", "accord"]);
     scene(&["convert", &at("scene.json"), &at("scene.geojson")]);
     scene(&["draw", &at("scene.geojson"), &at("scene.svg")]);
-    scene(&["draw", &fixture("lot.xodr").to_str().unwrap(), &at("place.svg")]);
+    scene(&["draw", fixture("lot.xodr").to_str().unwrap(), &at("place.svg")]);
     scene(&["check", &at("scene.json"), &at("scene.geojson"), &map]);
     assert!(fs::read_to_string(at("place.svg")).unwrap().contains(">spot<"));
     for (from, out) in [

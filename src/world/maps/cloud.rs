@@ -126,7 +126,8 @@ pub(super) fn csv(text: &str, options: &MapOptions, file: MapFile) -> Result<Map
             at = end;
         } else {
             let line = text[at..].lines().next().unwrap_or_default();
-            let number = || text[..at].matches('\n').count() + 1;
+            let begin = at;
+            let number = || text[..begin].matches('\n').count() + 1;
             at += line.len();
             // The line break, which may be two characters.
             at += text[at..].find('\n').map_or(text.len() - at, |end| end + 1);
