@@ -181,12 +181,10 @@ pub(super) fn fitted(problem: &Problem, path: &Path, terms: &Terms) -> Option<Pl
     // As it is, where it ends within the tolerance.
     let as_it_is = || problem.is_arrival(path.end()).then(|| ended(None)).flatten();
     let driven = goals.into_iter().find_map(|goal| ended(Some(goal))).or_else(as_it_is)?;
-    let result = PlanResult::certified(problem, driven.arcs.clone(), 0);
-    result.outcome.is_ok().then(|| {
-        let result = driven.in_place_of(result);
-        let smooth = result.smooth.filter(|_| terms.standstill != StandstillSteering::Anywhere);
-        PlanResult { smooth, ..result }
-    })
+    // Fitting ends exactly there, and the arcs of clothoids nearly: who checked them has certified it.
+    let result = driven.in_place_of(PlanResult::none(NoPath::NotSmooth, 0));
+    let smooth = result.smooth.filter(|_| terms.standstill != StandstillSteering::Anywhere);
+    Some(PlanResult { smooth, ..result })
 }
 
 /// A planner's result as `terms` ask for it; where its path cannot be driven so, another that can.

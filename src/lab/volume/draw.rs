@@ -64,8 +64,9 @@ fn vehicles(world: VolumeWorld) -> Vec<Vehicle> {
 
 fn some_wide(vehicle: &Vehicle, kind: ParkingType, seed: u64, index: u64) -> Scene {
     let drawn = (0..DRAWS).find_map(|i| wide(vehicle, kind, seed, index * DRAWS + i).ok());
-    // Sizes leave no room once in a while; for a vehicle that they hardly ever fit, a car park does.
-    drawn.unwrap_or_else(|| lot(vehicle, kind, seed, index))
+    // Sizes leave no room once in a while; for a vehicle that they hardly ever fit, a car park does, another than those
+    // of the world of car parks.
+    drawn.unwrap_or_else(|| lot(vehicle, kind, seed.wrapping_add(1), index))
 }
 
 /// Puts every other scene somewhere on a map.
@@ -100,7 +101,7 @@ mod tests {
             let case = draw(&config, number);
             assert_eq!(case.scene, draw(&config, number).scene);
             case.scene.validate(Path::new("drawn")).unwrap();
-            starts.insert(format!("{:?}", case.scene.start));
+            starts.insert(format!("{:?}", (case.scene.start, case.scene.vehicle, case.kind)));
             far += usize::from(case.scene.start.x.abs() > 1000.0);
             let length = format!("{:.2}", case.scene.vehicle.length);
             settings.insert((case.set, length, case.kind.map(|k| k.name())));
