@@ -6,7 +6,6 @@
 //! What lies beyond the image is not to be driven on: the image is the drivable area.
 
 use std::collections::HashMap;
-use std::fs;
 use std::path::Path;
 
 use saphyr_parser::{Event, Parser};
