@@ -197,6 +197,24 @@ typedef struct n3p_limits {
 } n3p_limits;
 
 /**
+ * A pose of the centre of the rear axle.
+ */
+typedef struct n3p_pose {
+    /**
+     * Metres.
+     */
+    double x;
+    /**
+     * Metres.
+     */
+    double y;
+    /**
+     * Radians, counter-clockwise from the x axis.
+     */
+    double heading;
+} n3p_pose;
+
+/**
  * How a parker plans. All zeros are the defaults.
  */
 typedef struct n3p_options {
@@ -228,24 +246,6 @@ typedef struct n3p_options {
      */
     int32_t standstill_steering;
 } n3p_options;
-
-/**
- * A pose of the centre of the rear axle.
- */
-typedef struct n3p_pose {
-    /**
-     * Metres.
-     */
-    double x;
-    /**
-     * Metres.
-     */
-    double y;
-    /**
-     * Radians, counter-clockwise from the x axis.
-     */
-    double heading;
-} n3p_pose;
 
 /**
  * What is asked of a plan besides avoiding obstacles.
@@ -482,6 +482,18 @@ enum n3p_status n3p_lot_grid(struct n3p_lot *lot,
  * n3p_scene_free.
  */
 enum n3p_status n3p_scene_read(const char *file, struct n3p_scene **scene);
+
+/**
+ * Reads a map of any kind (docs/formats.md) and makes it a scene: an occupancy grid (`.yaml`), points (`.csv`, `.pcd`),
+ * `.geojson`, CommonRoad (`.xml`), OpenDRIVE (`.xodr`) or a scene; to be freed by n3p_scene_free. `vehicle`, `start` and
+ * `goals` take the place of the map's, where it has any; NULL, and a count of 0, leave the map's as they are.
+ */
+enum n3p_status n3p_scene_read_map(const char *file,
+                                   const struct n3p_vehicle *vehicle,
+                                   const struct n3p_pose *start,
+                                   const struct n3p_pose *goals,
+                                   size_t goal_count,
+                                   struct n3p_scene **scene);
 
 /**
  * Reads a scene from `length` bytes of JSON (docs/formats.md); to be freed by n3p_scene_free.
