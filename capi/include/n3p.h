@@ -248,6 +248,28 @@ typedef struct n3p_options {
 } n3p_options;
 
 /**
+ * Distances on each side of a car, metres.
+ */
+typedef struct n3p_margins {
+    /**
+     * Ahead of it.
+     */
+    double front;
+    /**
+     * Behind it.
+     */
+    double rear;
+    /**
+     * On its left.
+     */
+    double left;
+    /**
+     * On its right.
+     */
+    double right;
+} n3p_margins;
+
+/**
  * What is asked of a plan besides avoiding obstacles.
  */
 typedef struct n3p_request {
@@ -275,6 +297,29 @@ typedef struct n3p_request {
      * How the goal lies in its spot, an n3p_parking_type.
      */
     int32_t parking_type;
+    /**
+     * Distance to keep ahead of the car, behind it, and on either side, metres, 0 to 1; 0 for the
+     * parker's own.
+     */
+    struct n3p_margins margins;
+    /**
+     * The car's outline in its own frame, x and y of each vertex in turn, within the rectangle of its
+     * sizes; NULL where it is that rectangle.
+     */
+    const double *contour;
+    /**
+     * How many vertices the outline has, 3 to 64; 0 for none.
+     */
+    size_t contour_count;
+    /**
+     * Angle of the front wheels at the start, radians, positive to the left.
+     */
+    double start_steer;
+    /**
+     * The plan that the car follows already, which is kept while it is free and near the best; NULL
+     * for none.
+     */
+    const struct n3p_plan *previous;
 } n3p_request;
 
 /**
@@ -311,7 +356,7 @@ typedef struct n3p_summary {
      */
     char method[16];
     /**
-     * How n3p came to it: "library", "direct", "searched", "fallback", "no-lane", "no-spot"; "" by
+     * How n3p came to it: "library", "direct", "searched", "fallback", "no-lane", "no-spot", or "kept"; "" by
      * other methods.
      */
     char route[16];
@@ -446,9 +491,29 @@ enum n3p_status n3p_lot_clear(struct n3p_lot *lot);
 enum n3p_status n3p_lot_polygon(struct n3p_lot *lot, const double *xy, size_t count);
 
 /**
- * Adds a line without thickness, such as a kerb or a fence; `xy` as in n3p_lot_polygon.
+ * Adds a line without thickness, such as a fence; `xy` as in n3p_lot_polygon.
  */
 enum n3p_status n3p_lot_polyline(struct n3p_lot *lot, const double *xy, size_t count);
+
+/**
+ * Adds a solid that only wheels must keep off, such as a traffic island; `xy` as in n3p_lot_polygon.
+ */
+enum n3p_status n3p_lot_low_polygon(struct n3p_lot *lot,
+                                    const double *xy,
+                                    size_t count);
+
+/**
+ * Adds a line that only wheels must keep off, such as a kerb; `xy` as in n3p_lot_polygon.
+ */
+enum n3p_status n3p_lot_low_polyline(struct n3p_lot *lot, const double *xy, size_t count);
+
+/**
+ * Keeps the car's body within a polygon, instead of one given before; `xy` as in n3p_lot_polygon. What is
+ * left out of it are polygons that stand there.
+ */
+enum n3p_status n3p_lot_drivable_area(struct n3p_lot *lot,
+                                      const double *xy,
+                                      size_t count);
 
 /**
  * Adds points, as a range sensor sees them; `xy` as in n3p_lot_polygon.
