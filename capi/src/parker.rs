@@ -281,9 +281,9 @@ unsafe fn to_request(request: &n3p_request) -> Result<Request> {
     // SAFETY: the caller's word.
     let goals = unsafe { read_all(request.goals, count, "goals") }?;
     let (position_m, heading_rad) = (request.position_tolerance, request.heading_tolerance);
-    // SAFETY: pairs of numbers are aligned as numbers are, and the caller's word.
     let contour = match request.contour_count {
         0 => &[],
+        // SAFETY: pairs of numbers are aligned as numbers are, and the caller's word.
         count => unsafe { read_all(request.contour.cast::<[f64; 2]>(), count, "contour") }?,
     };
     let n3p_margins { front, rear, left, right } = request.margins;

@@ -22,7 +22,7 @@ pub(crate) static PLANS: Table<Kept> = Table::new("n3p_plan", 4);
 
 /// A plan, with what somebody has asked for: who asks for a size first asks twice.
 pub(crate) struct Kept {
-    plan: Plan,
+    pub(crate) plan: Plan,
     poses: OnceLock<PathFile>,
     json: OnceLock<CString>,
     /// The path in time within the limits that were asked for last.

@@ -114,13 +114,17 @@ impl From<ProblemError> for Failure {
     fn from(error: ProblemError) -> Self {
         let in_collision = |which: &str, conflict: &Conflict| {
             let touches = match conflict {
-                Conflict::Obstacle { obstacle, .. } => Some(obstacle.clone()),
+                Conflict::Obstacle { obstacle, .. } | Conflict::Low { obstacle, .. } => {
+                    Some(obstacle.clone())
+                }
                 _ => None,
             };
             let what = match conflict {
                 Conflict::Obstacle { depth, .. } => {
                     format!("stands {} cm deep in an obstacle", (depth * 100.0).ceil().max(1.0))
                 }
+                Conflict::Low { .. } => "has a wheel on something low, such as a kerb".to_owned(),
+                Conflict::Area => "stands outside the drivable area".to_owned(),
                 Conflict::Bounds => "stands outside the bounds of the scene".to_owned(),
                 Conflict::Unknown => "touches an obstacle or the bounds of the scene".to_owned(),
             };
