@@ -190,6 +190,7 @@ impl Calls<'_> {
         let goals = [self.pose()?, self.pose()?];
         let count = usize::from(u8::arbitrary(&mut self.u)? % 3);
         let mut requests = Vec::new();
+        let contour: Vec<f64> = (0..8).map(|_| number(&mut self.u)).collect::<Result<_>>()?;
         let mut lots: Vec<*const n3p_lot> = Vec::new();
         for _ in 0..count {
             let start = self.pose()?;
@@ -201,7 +202,20 @@ impl Calls<'_> {
                 position_tolerance: number(u)?,
                 heading_tolerance: number(u)?,
                 parking_type: i32::from(u8::arbitrary(u)? % 6),
+                margins: n3p_margins {
+                    front: number(u)?,
+                    rear: number(u)?,
+                    left: number(u)?,
+                    right: number(u)?,
+                },
+                contour: contour.as_ptr(),
+                contour_count: usize::from(u8::arbitrary(u)? % 5),
+                start_steer: number(u)?,
+                previous: ptr::null(),
             });
+            if bool::arbitrary(u)? {
+                requests[requests.len() - 1].previous = self.handle()?;
+            }
             lots.push(self.handle()?);
         }
         let parker = self.handle()?;

@@ -7,7 +7,8 @@ use n3p::curves::TrajectoryLimits;
 use n3p::curves::smoothing::StandstillSteering;
 use n3p::geometry::Pose;
 use n3p::planners::{Budget, Shape};
-use n3p::world::{GoalTolerance, ParkingType};
+use n3p::vehicle::Margins;
+use n3p::world::{DrivableArea, GoalTolerance, ParkingType, PreviousPath};
 use n3p::{Lot, Method, Models, Parker, Request, Vehicle};
 
 /// Mostly a number that means something, at times any.
@@ -66,6 +67,15 @@ fn lot(u: &mut Unstructured) -> Result<Lot> {
     }
     lot.points(some(u, 6, point)?);
     if u8::arbitrary(u)? % 4 == 0 {
+        lot.low_polygon(some(u, 6, point)?);
+        lot.low_polyline(some(u, 4, point)?);
+        lot.low_points(some(u, 3, point)?);
+    }
+    if u8::arbitrary(u)? % 8 == 0 {
+        let (outer, holes) = (some(u, 6, point)?, some(u, 2, |u| some(u, 5, point))?);
+        lot.drivable_area(DrivableArea { outer, holes });
+    }
+    if u8::arbitrary(u)? % 4 == 0 {
         lot.bounds([number(u)?, number(u)?, number(u)?, number(u)?]);
     }
     if u8::arbitrary(u)? % 4 == 0 {
@@ -75,6 +85,17 @@ fn lot(u: &mut Unstructured) -> Result<Lot> {
         lot.grid(origin, resolution, columns, &cells);
     }
     Ok(lot)
+}
+
+fn previous(u: &mut Unstructured) -> Result<PreviousPath> {
+    Ok(PreviousPath {
+        poses: some(u, 6, |u| pose(u).map(Into::into))?,
+        gears: some(u, 6, |u| Ok(if bool::arbitrary(u)? { 1 } else { -1 }))?,
+        steer: some(u, 6, number)?,
+        steer_from: if bool::arbitrary(u)? { Some(some(u, 6, number)?) } else { None },
+        steer_to: if bool::arbitrary(u)? { Some(some(u, 6, number)?) } else { None },
+        ..PreviousPath::default()
+    })
 }
 
 /// Everything that can be asked of a parker, with any numbers.
@@ -93,6 +114,15 @@ fn tried(u: &mut Unstructured) -> Result<()> {
             None
         },
         parking_type: Some(*u.choose(&ParkingType::ALL)?).filter(|_| data_is_even(u)),
+        contour: if u8::arbitrary(u)? % 4 == 0 { some(u, 8, point)? } else { Vec::new() },
+        margins: if u8::arbitrary(u)? % 4 == 0 {
+            let [front, rear, left, right] = [number(u)?, number(u)?, number(u)?, number(u)?];
+            Some(Margins { front, rear, left, right })
+        } else {
+            None
+        },
+        start_steer: if u8::arbitrary(u)? % 4 == 0 { number(u)? } else { 0.0 },
+        previous: if u8::arbitrary(u)? % 4 == 0 { Some(previous(u)?) } else { None },
     };
     let method = if u8::arbitrary(u)? % 8 == 0 { Method::N3P } else { Method::HA_RS };
     let models = if method == Method::N3P && vehicle == Vehicle::default() {
