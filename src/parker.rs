@@ -16,6 +16,7 @@ use crate::planners::cost::CostModel;
 use crate::planners::goals::{self, Terms};
 use crate::planners::{Budget, HybridAStarConfig, NoPath, Planner, ProblemError, Route, Shape};
 use crate::vehicle::{Margins, Vehicle, VehicleError};
+use crate::world::maps::cells::{Block, blocks};
 use crate::world::{DrivableArea, GoalTolerance, LowObstacles, ParkingType, PreviousPath, Scene};
 
 /// Plans for one vehicle. Shared between threads by reference: each call borrows a planner of its
@@ -383,39 +384,15 @@ impl Lot {
         columns: usize,
         occupied: &[bool],
     ) -> &mut Self {
-        let rows = occupied.len().checked_div(columns).unwrap_or(0);
-        // Runs of a row, grown upward over the rows that have the same run.
-        let mut open: Vec<(usize, usize, usize)> = Vec::new();
-        for y in 0..=rows {
-            let row = if y < rows { &occupied[y * columns..(y + 1) * columns] } else { &[] };
-            let mut runs = Vec::new();
-            let mut x = 0;
-            while x < row.len() {
-                let from = x;
-                while x < row.len() && row[x] == row[from] {
-                    x += 1;
-                }
-                if row[from] {
-                    runs.push((from, x));
-                }
+        let cells: Vec<u8> = occupied.iter().map(|&cell| u8::from(cell)).collect();
+        let is_occupied = std::array::from_fn(|value| value != 0);
+        let at = |x: usize, y: usize| {
+            [origin[0] + x as f64 * resolution, origin[1] + y as f64 * resolution]
+        };
+        if columns > 0 {
+            for Block { x0, x1, y0, y1 } in blocks(cells.chunks_exact(columns), &is_occupied) {
+                self.polygon([at(x0, y0), at(x1, y0), at(x1, y1), at(x0, y1)]);
             }
-            let mut still = Vec::new();
-            for (from, to, since) in open {
-                if runs.contains(&(from, to)) {
-                    still.push((from, to, since));
-                } else {
-                    let at = |x: usize, y: usize| {
-                        [origin[0] + x as f64 * resolution, origin[1] + y as f64 * resolution]
-                    };
-                    self.polygon([at(from, since), at(to, since), at(to, y), at(from, y)]);
-                }
-            }
-            for (from, to) in runs {
-                if !still.iter().any(|&(f, t, _)| (f, t) == (from, to)) {
-                    still.push((from, to, y));
-                }
-            }
-            open = still;
         }
         self
     }

@@ -2,7 +2,7 @@
 
 /// A block of cells: columns `x0..x1` of rows `y0..y1`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Block {
+pub(crate) struct Block {
     pub x0: usize,
     pub x1: usize,
     pub y0: usize,
@@ -12,7 +12,7 @@ pub(super) struct Block {
 /// The blocked cells of a grid as blocks that do not overlap: runs of a row, grown over the rows that have the same run.
 ///
 /// `rows` from the lowest on; a byte stands for a blocked cell where `is_blocked` says so.
-pub(super) fn blocks<'a>(
+pub(crate) fn blocks<'a>(
     rows: impl Iterator<Item = &'a [u8]>,
     is_blocked: &[bool; 256],
 ) -> Vec<Block> {

@@ -5,7 +5,7 @@
 //! metres and back); with the feature `maps` also `grid` with `image` and `cells` (occupancy grids), `commonroad` and
 //! `opendrive` with `xml`. Scene files are maps as well. The formats are described in `docs/formats.md`.
 
-mod cells;
+pub(crate) mod cells;
 mod cloud;
 #[cfg(feature = "maps")]
 mod commonroad;
@@ -177,7 +177,8 @@ impl Map {
     ) -> Result<Map, SceneError> {
         let file = MapFile { path, bytes };
         let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-        let read = || bytes(path).map_err(|error| SceneError::Read { path: path.into(), error });
+        let read =
+            || (file.bytes)(path).map_err(|error| SceneError::Read { path: path.into(), error });
         let mut map = match &ending.to_ascii_lowercase()[..] {
             "yaml" | "yml" => file.grid(&file.text(read()?)?, options)?,
             "pcd" => pcd::read(&read()?, options, file)?,
