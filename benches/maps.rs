@@ -1,4 +1,5 @@
-//! How long large maps take from the bytes of their file to a scene: 10⁶ points, and a grid of 4,000 × 4,000 cells.
+//! How long large maps take from the bytes of their file to a scene: 10⁶ points, and a grid of 4,000 × 4,000 cells; and
+//! from a scene of so many points to an indexed problem, and to a plan in it.
 
 use std::fs;
 use std::hint::black_box;
@@ -6,8 +7,9 @@ use std::path::Path;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use n3p::geometry::Pose;
+use n3p::planners::{Budget, HybridAStar, HybridAStarConfig, Planner, Problem};
 use n3p::vehicle::Vehicle;
-use n3p::world::{Map, MapRequest};
+use n3p::world::{Map, MapRequest, Scene};
 
 fn request() -> MapRequest {
     MapRequest {
@@ -90,5 +92,37 @@ fn maps(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, maps);
+/// A bay between two scanned cars, and very many points farther away.
+fn scanned(others: u32) -> Scene {
+    let side = |x: f64| (0..40).map(move |i| [x, -2.6 + 0.12 * f64::from(i)]);
+    let away = (0..others).map(|i| {
+        let (radius, angle) = (30.0 + 170.0 * scattered(i), 6.28 * scattered(i ^ 0x5555));
+        [radius * angle.cos(), radius * angle.sin()]
+    });
+    Scene {
+        start: Pose::new(-9.0, 5.5, 0.0),
+        goal: Pose::new(0.0, -1.4, std::f64::consts::FRAC_PI_2),
+        points: side(-1.6).chain(side(1.6)).chain(away).collect(),
+        ..Scene::default()
+    }
+}
+
+fn planning(c: &mut Criterion) {
+    let mut group = c.benchmark_group("among points");
+    group.sample_size(10);
+    for others in [100, 1_000_000] {
+        let scene = scanned(others);
+        group.bench_function(format!("{others} to an indexed problem"), |b| {
+            b.iter(|| Problem::new(black_box(&scene)).unwrap())
+        });
+        let problem = Problem::new(&scene).unwrap();
+        let mut planner = HybridAStar::new(HybridAStarConfig::default());
+        group.bench_function(format!("{others}, a plan by ha-rs"), |b| {
+            b.iter(|| planner.plan(&problem, Budget::new(200_000)))
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, maps, planning);
 criterion_main!(benches);
