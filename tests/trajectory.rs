@@ -254,7 +254,10 @@ fn what_cannot_be_is_refused_before_planning() {
         }
         assert!(stderr.trim().lines().count() <= 2, "more than two lines: {stderr}");
     };
-    refused(&["--trajectory", "t.txt"], &["t.txt", "--trajectory", ".csv, .json, .geojson or .mcap"]);
+    refused(
+        &["--trajectory", "t.txt"],
+        &["t.txt", "--trajectory", ".csv, .json, .geojson or .mcap"],
+    );
     refused(&["--trajectory", "csv"], &["csv", ".csv, .json, .geojson or .mcap"]);
     for value in ["0", "-1", "NaN", "inf", "fast"] {
         for (flag, unit) in [

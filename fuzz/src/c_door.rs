@@ -214,7 +214,8 @@ impl Calls<'_> {
                 previous: ptr::null(),
             });
             if bool::arbitrary(u)? {
-                requests[requests.len() - 1].previous = self.handle()?;
+                let previous = self.handle()?;
+                requests.last_mut().expect("one was pushed").previous = previous;
             }
             lots.push(self.handle()?);
         }

@@ -230,7 +230,18 @@ fn files_become_scenes() {
     assert_eq!(loaded["scene"]["name"], "Case1");
     assert_eq!(loaded["scene"]["obstacles"].as_array().unwrap().len(), 1);
     assert!(message(&load("Case1.csv", "0,0,zero")).contains("zero"));
-    assert!(message(&load("lot.pgm", "P5")).contains(".json"));
+    assert!(message(&load("lot.pgm", "P5")).contains(".yaml"));
     assert!(message(&load("lot.json", "{}")).contains("vehicle"));
-    assert!(message(&load("lot.json", "")).contains("scene"));
+    assert!(message(&load("lot.json", "")).contains("empty"));
+    // An occupancy grid needs its image, and gets a start and a goal to be moved.
+    let yaml = "image: lot.pgm\nresolution: 1\norigin: [0, 0, 0]\nnegate: 0\n\
+                occupied_thresh: 0.65\nfree_thresh: 0.2\n";
+    assert!(message(&load("lot.yaml", yaml)).contains("lot.pgm"));
+    let image = format!("P2 20 10 255 {} 0 {}", "254 ".repeat(19), "254 ".repeat(180));
+    let [yaml, image] = [yaml, &image].map(|text| BASE64_STANDARD.encode(text));
+    let others = json!([{ "name": "lot.pgm", "bytes": image }]);
+    let load = json!({ "load": { "name": "lot.yaml", "bytes": yaml, "others": others } });
+    let scene = &ask(&load)["scene"];
+    assert_eq!(scene["obstacles"], json!([[[19.0, 9.0], [20.0, 9.0], [20.0, 10.0], [19.0, 10.0]]]));
+    assert!(ask(&json!({ "plan": { "scene": scene, "methods": ["ha-rs"] } }))["plans"].is_array());
 }
