@@ -68,7 +68,7 @@ case "${1:-}" in
     done
     ;;
   all)
-    for name in $(names); do "$0" "$name" "${2:?seconds}"; done
+    for name in $(names); do "./run.sh" "$name" "${2:?seconds}"; done
     ;;
   seeds)
     build --bin seeds
