@@ -193,7 +193,7 @@ def test_no_scene(parker, scene):
         ({"start": "here"}, "start"),
         ({"goal": None}, "goal"),
         ({"goal": [1e300, 0, 0]}, "goal|coordinate"),
-        ({"obstacles": 3}, "expected a sequence"),
+        ({"obstacles": 3}, "obstacles is 3; expected a list"),
         ({"obstacles": [[[0, 0], [1, NAN]]]}, r"obstacles\[0\]\[1\]\[1\]"),
         ({"obstacles": [Odd()]}, r"obstacles\[0\]: is a Odd"),
         ({"obstacles": itself}, "too deep"),

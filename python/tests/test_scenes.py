@@ -63,7 +63,8 @@ def test_a_scene_of_arguments_plans_the_same(parker):
         polygons=POLYGONS, polylines=[[(-15, 9.5), (15, 9.5), (15, 12)]], points=[(12.0, 8.0)]
     )
     scene = parker.scene(START, GOAL, name="bay", **lot)
-    assert scene.name == "bay" and scene.points.shape == (1, 2) and len(scene.obstacles) == 4
+    assert scene.name == "bay" and scene.points.shape == (1, 2) and len(scene.obstacles) == 2
+    assert scene["polylines"] == [[[-15, 9.5], [15, 9.5], [15, 12]]]
     assert parker.plan_scene(scene).to_json() == parker.plan(START, GOAL, **lot).to_json()
     assert n3p.Scene(START, GOAL, name="bay", **lot) == scene
 
