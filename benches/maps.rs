@@ -1,6 +1,7 @@
 //! How long large maps take from the bytes of their file to a scene: 10⁶ points, and a grid of 4,000 × 4,000 cells; and
 //! from a scene of so many points to an indexed problem, and to a plan in it.
 
+use std::f64::consts::TAU;
 use std::fs;
 use std::hint::black_box;
 use std::path::Path;
@@ -96,7 +97,7 @@ fn maps(c: &mut Criterion) {
 fn scanned(others: u32) -> Scene {
     let side = |x: f64| (0..40).map(move |i| [x, -2.6 + 0.12 * f64::from(i)]);
     let away = (0..others).map(|i| {
-        let (radius, angle) = (30.0 + 170.0 * scattered(i), 6.28 * scattered(i ^ 0x5555));
+        let (radius, angle) = (30.0 + 170.0 * scattered(i), TAU * scattered(i ^ 0x5555));
         [radius * angle.cos(), radius * angle.sin()]
     });
     Scene {
