@@ -236,7 +236,9 @@ fn what_is_wrong_is_named() {
             "contour[1] = [9, 0] lies outside of the rectangle",
         ),
         (r#""margins": {"left": -1}"#, "margins.left is -1; expected a number from 0 to 1 m"),
-        (r#""margins": {"mirror": 0}"#, "mirror"),
+        (r#""margins": {"left": "x"}"#, r#"margins.left is "x"; expected a finite number"#),
+        (r#""margins": {"mirror": 0}"#, "margins.mirror is unknown; expected front and rear"),
+        (r#""start_steer": "x""#, r#"start_steer is "x"; expected a number"#),
     ] {
         let error = read(more).unwrap_err().to_string();
         assert!(error.contains(told), "{more}: {error}");

@@ -192,6 +192,8 @@ fn misshapen(scene: &Value) -> Option<(String, String)> {
             }
         })
         .or_else(|| wrong_tolerance(scene.get("goal_tolerance")?))
+        .or_else(|| wrong_margins(scene.get("margins")?))
+        .or_else(|| wrong_steer(scene.get("start_steer")?))
         .or_else(|| not_numbers(bounds?, 4, "bounds".to_owned()))
         .or_else(|| wrong_lists(scene, "", &["contour", "points", "obstacles", "polylines"]))
         .or_else(|| wrong_lists(scene.get("low")?, "low.", &["points", "obstacles", "polylines"]))
@@ -226,22 +228,43 @@ fn wrong_lists(object: &Value, prefix: &str, names: &[&str]) -> Option<(String, 
     })
 }
 
-/// What is wrong with a goal tolerance that is not two numbers.
-fn wrong_tolerance(value: &Value) -> Option<(String, String)> {
-    const FIELDS: [&str; 2] = ["position_m", "heading_rad"];
+/// What is wrong with an object that is not these numbers; `shape` is what it should look like.
+fn wrong_numbers(
+    name: &str,
+    value: &Value,
+    fields: &[&str],
+    shape: &str,
+) -> Option<(String, String)> {
     let Some(given) = value.as_object() else {
-        let shape = r#"expected {"position_m": metres, "heading_rad": radians}"#;
-        let wrong = format!("is {}; {shape}", brief(value));
-        return (!value.is_null()).then_some(("goal_tolerance".to_owned(), wrong));
+        let wrong = format!("is {}; expected {shape}", brief(value));
+        return (!value.is_null()).then_some((name.to_owned(), wrong));
     };
-    given.iter().find_map(|(name, value)| {
-        let message = match (FIELDS.contains(&name.as_str()), value.is_number()) {
+    given.iter().find_map(|(field, value)| {
+        let message = match (fields.contains(&field.as_str()), value.is_number()) {
             (true, true) => return None,
             (true, false) => format!("is {}; expected a finite number", brief(value)),
-            (false, _) => "is unknown; expected position_m and heading_rad".to_owned(),
+            (false, _) => format!("is unknown; expected {}", fields.join(" and ")),
         };
-        Some((format!("goal_tolerance.{name}"), message))
+        Some((format!("{name}.{field}"), message))
     })
+}
+
+/// What is wrong with a goal tolerance that is not two numbers.
+fn wrong_tolerance(value: &Value) -> Option<(String, String)> {
+    let shape = r#"{"position_m": metres, "heading_rad": radians}"#;
+    wrong_numbers("goal_tolerance", value, &["position_m", "heading_rad"], shape)
+}
+
+/// What is wrong with margins that are not up to four numbers.
+fn wrong_margins(value: &Value) -> Option<(String, String)> {
+    let shape = r#"{"front": metres, "rear": metres, "left": metres, "right": metres}"#;
+    wrong_numbers("margins", value, &Margins::NAMES, shape)
+}
+
+/// What is wrong with an angle of the wheels that is no number.
+fn wrong_steer(value: &Value) -> Option<(String, String)> {
+    let wrong = || ("start_steer".to_owned(), format!("is {}; expected a number", brief(value)));
+    (!value.is_number()).then(wrong)
 }
 
 /// What is wrong with `value`, where `count` numbers are expected.
