@@ -5,7 +5,7 @@
 #   fuzz/run.sh build                 builds the targets
 #   fuzz/run.sh list                  their names
 #   fuzz/run.sh TARGET SECONDS [...]  fuzzes one, from its corpus; what is found lies in target/found/
-#   fuzz/run.sh all SECONDS           each in turn
+#   fuzz/run.sh all SECONDS           each, as many at once as there are processors
 #   fuzz/run.sh replay [TARGET]       runs the corpora once
 #   fuzz/run.sh seeds                 adds to the corpora what they began with
 #   fuzz/run.sh minimise TARGET       keeps of its corpus and of what it learnt what adds coverage
@@ -51,6 +51,16 @@ fuzz() {
   "$bin/$name" -artifact_prefix="$target/found/$name/" -timeout=30 -rss_limit_mb=2048 \
     -max_len=4096 -print_final_stats=1 -verbosity=0 "$@"
 }
+# In a line; in full where something is found.
+logged() {
+  local name="$1" log="$target/$1.log"
+  if fuzz "$@" >"$log" 2>&1; then
+    echo "$name: $(sed -n 's/^stat::number_of_executed_units: *//p' "$log") inputs"
+  else
+    grep -v NEW_FUNC "$log" | tail -n 40
+    exit 1
+  fi
+}
 
 case "${1:-}" in
   build) build ;;
@@ -58,17 +68,15 @@ case "${1:-}" in
   replay)
     for name in $(if [ -n "${2:-}" ]; then echo "$2"; else names; fi); do
       [ -x "$bin/$name" ] || build
-      log="$target/$name.log"
-      if fuzz "$name" -runs=0 "corpus/$name" >"$log" 2>&1; then
-        echo "$name: $(ls "corpus/$name" | wc -l) inputs"
-      else
-        grep -v NEW_FUNC "$log" | tail -n 40
-        exit 1
-      fi
+      logged "$name" -runs=0 "corpus/$name"
     done
     ;;
   all)
-    for name in $(names); do "./run.sh" "$name" "${2:?seconds}"; done
+    seconds="${2:?seconds}"
+    names | xargs -P "$(getconf _NPROCESSORS_ONLN)" -I NAME ./run.sh logged NAME "$seconds"
+    ;;
+  logged)
+    logged "$2" -max_total_time="$3" "$target/learnt/$2" "corpus/$2"
     ;;
   seeds)
     build --bin seeds

@@ -304,10 +304,16 @@ fn what_a_program_started_ends_with_it() {
     for (number, script) in [hangs, floods, ends].into_iter().enumerate() {
         let pids = folder.path().join(number.to_string());
         let mut policy = sh(&script.replace("PIDS", &pids.display().to_string()), SHORT);
+        // A loaded machine may take longer to start a shell than the policy is given to answer.
+        let started = || fs::read_to_string(&pids).ok().filter(|pid| pid.ends_with('\n'));
+        let begun = Instant::now();
+        while started().is_none() && begun.elapsed() < PATIENT {
+            sleep(Duration::from_millis(5));
+        }
+        let pid = started().expect(script);
         let _ = act(&mut policy, 0);
         let _ = act(&mut policy, 1);
         drop(policy);
-        let pid = fs::read_to_string(&pids).unwrap();
         // Whoever adopts it may be late to bury it: a zombie has ended.
         let runs = || {
             let stat = fs::read_to_string(format!("/proc/{}/stat", pid.trim()));

@@ -73,7 +73,7 @@ CARGO_TARGET_DIR="$target" "${embed[@]}"
 CARGO_TARGET_DIR="$target" "${embed[@]}" examples/ten-scenes.txt "$work/ten/rust"
 
 echo "-- the same bytes as n3p-plan"
-# With the features given, such as the default ones: n3p-plan is already built by them in CI.
+# With what is given, such as --workspace: in CI n3p-plan is already built that way.
 cargo build --release --locked --bin n3p-plan "$@"
 while read -r file; do
   name="$(basename "${file%.*}")"
