@@ -63,7 +63,7 @@ fn bench(c: &mut Criterion) {
         turned_at_start: false,
         turned_at_changes,
         sharpness,
-        last_straight: 0.0,
+        last_straight: None,
     };
     group.bench_function("smooth", |b| {
         b.iter(|| {

@@ -245,7 +245,7 @@ fn smoothed_curves_end_where_they_did() {
                 turned_at_start: false,
                 turned_at_changes,
                 sharpness: &sharpness,
-                last_straight: 0.0,
+                last_straight: None,
             };
             all += 1;
             let Some(smoothed) = smooth(&path, to, &smoothing) else { continue };
@@ -272,7 +272,7 @@ fn straight_ahead_is_driven_as_it_is() {
         turned_at_start: false,
         turned_at_changes: true,
         sharpness: &[0.2],
-        last_straight: 0.0,
+        last_straight: None,
     };
     assert_eq!(smooth(&path, path.end(), &smoothing), Some(SmoothPath::of(&path)));
     let nothing = Path::new(Pose::default(), []);

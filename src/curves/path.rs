@@ -125,6 +125,18 @@ impl Path {
         }
     }
 
+    /// The path given in the world of the parent of `frame`, seen from `frame`.
+    pub fn seen_from(&self, frame: &Frame) -> Path {
+        // A mirror is its own inverse.
+        let segments = self.to_world(frame).segments;
+        Path { start: frame.local_from_world(self.start), segments }
+    }
+
+    /// The same way driven backwards, from its end to its start.
+    pub fn reversed(&self) -> Path {
+        Path::new(self.end(), self.segments.iter().rev().map(|s| s.reversed()))
+    }
+
     /// Mean |δ(t + 0.1 s) − δ(t)| along the path at the vehicle's speeds, radians (the
     /// paper's Δδ). Zero for paths shorter than one time step.
     pub fn mean_abs_steer_change(&self, vehicle: &Vehicle) -> f64 {

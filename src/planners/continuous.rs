@@ -2,11 +2,13 @@
 //!
 //! A planner's path is arcs and straights. Here it gets clothoids wherever its curvature jumps
 //! ([`smoothing`]), the gentlest first, and is checked anew, whole, with its clothoids. Where that
-//! does not fit, a search looks for other paths that do: a path counts there only if it is free once it is smooth.
+//! does not fit, a search (`steered`) looks for other paths: first one that is free once it is smooth, then one whose
+//! steering angle does not jump anywhere.
 
-use super::hybrid_astar::HybridAStar;
 use super::problem::Terms;
 use super::shape::{ended_straight, lengthened};
+use super::steered::{self, Joined};
+use super::transitions::Turning;
 use super::{Budget, Guidance, NoPath, PlanResult, Planner, Problem, Route, keeps_limits};
 use crate::curves::smoothing::{Smoothing, StandstillSteering, smooth};
 use crate::curves::{Path, SmoothPath};
@@ -19,9 +21,11 @@ const GENTLEST: f64 = 0.25;
 const SHARPEST: f64 = 0.0075;
 /// Fits for a path that ends straight.
 const WISHES: usize = 2;
-/// Expansions for a path that is free once it is smooth, and paths that are looked at.
+/// Expansions of the search for a path that is free once it is smooth, and of that for one that is continuous; and
+/// paths of each that are looked at.
 const EXPANSIONS: usize = 20_000;
-const PATHS: usize = 400;
+const STEERED_EXPANSIONS: usize = 100_000;
+const PATHS: usize = 100;
 
 /// The sharpness of the clothoids that a run of a path can have, the gentlest first, 1/m².
 fn sharpnesses(vehicle: &Vehicle) -> Vec<f64> {
@@ -35,7 +39,8 @@ fn sharpnesses(vehicle: &Vehicle) -> Vec<f64> {
 #[derive(Clone, Copy, Debug)]
 struct Wanted {
     standstill: StandstillSteering,
-    last_straight: f64,
+    /// The least length of the straight at its end, metres, if one is asked for.
+    last_straight: Option<f64>,
     /// Where it is to end, if not where it does.
     goal: Option<Pose>,
 }
@@ -58,7 +63,7 @@ fn smoothed(problem: &Problem, path: &Path, wanted: Wanted) -> Option<Driven> {
     let starts: &[bool] = match wanted.standstill {
         StandstillSteering::Never => &[false],
         // Straight wheels at the start are worth more than a straight end.
-        StandstillSteering::AtChanges if wanted.last_straight > 0.0 => &[false],
+        StandstillSteering::AtChanges if wanted.last_straight.is_some() => &[false],
         StandstillSteering::AtChanges => &[false, true],
         // Wheels that turn anywhere need no clothoids.
         StandstillSteering::Anywhere => &[true],
@@ -84,7 +89,7 @@ fn smoothed_from(
     let mut steps = vec![0; path.direction_changes() + 1];
     let mut sharpness = Vec::with_capacity(steps.len());
     // Each run could be tried with each; what is only a wish is given up sooner.
-    let tries = if last_straight > 0.0 { WISHES } else { usize::MAX };
+    let tries = if last_straight.is_some() { WISHES } else { usize::MAX };
     for _ in 0..tries {
         sharpness.clear();
         sharpness.extend(steps.iter().map(|&step: &usize| choice[step]));
@@ -145,19 +150,43 @@ fn checked(
     if is_kept { Ok(Driven { smooth: path, arcs }) } else { Err(None) }
 }
 
+/// A continuous way with the curve that joins it made smooth, if it can be driven so, with straight wheels at the
+/// start if possible.
+fn continued(
+    problem: &Problem,
+    joined: &Joined,
+    turning: Turning,
+    standstill: StandstillSteering,
+) -> Option<Driven> {
+    [false, true].into_iter().filter(|&at_start| turning.at_changes || !at_start).find_map(
+        |at_start| {
+            let smoothing = Smoothing {
+                begin: problem.start_curvature,
+                turned_at_start: at_start,
+                turned_at_changes: turning.at_changes,
+                sharpness: &[turning.sharpness],
+                last_straight: joined.ends_straight.then_some(0.0),
+            };
+            let mut path = smooth(&joined.curve, joined.curve.end(), &smoothing)?;
+            path.motions.extend(&joined.way);
+            checked(problem, path, standstill).ok()
+        },
+    )
+}
+
 /// A planner's result with its moves as long, its end as straight and its path as smooth as `terms` ask for, if
 /// it can be driven so; what is asked of its shape only where there is room for it.
 fn shaped(problem: &Problem, result: &PlanResult, terms: &Terms) -> Option<PlanResult> {
     let path = result.outcome.as_ref().ok()?;
     let [least_move, last_straight] = terms.lengths(&problem.vehicle);
     let standstill = terms.standstill;
-    let any_end = Wanted { standstill, last_straight: 0.0, goal: None };
+    let any_end = Wanted { standstill, last_straight: None, goal: None };
     // Who stops anywhere near the goal has no end to be straight, and who is there already stays.
     let is_free_to_shape = result.covered.is_none() && path.length() > last_straight;
     let longer = lengthened(problem, path, if is_free_to_shape { least_move } else { 0.0 });
     let mut ways = vec![(&longer, any_end)];
     if is_free_to_shape && last_straight > ended_straight(path) {
-        ways.insert(0, (&longer, Wanted { last_straight, ..any_end }));
+        ways.insert(0, (&longer, Wanted { last_straight: Some(last_straight), ..any_end }));
     }
     if longer != *path {
         ways.push((path, any_end));
@@ -176,7 +205,7 @@ pub(super) fn fitted(problem: &Problem, path: &Path, terms: &Terms) -> Option<Pl
     };
     let ended = |goal: Option<Pose>| {
         let standstill = terms.standstill;
-        smoothed(problem, path, Wanted { standstill, last_straight: 0.0, goal })
+        smoothed(problem, path, Wanted { standstill, last_straight: None, goal })
     };
     // As it is, where it ends within the tolerance.
     let as_it_is = || problem.is_arrival(path.end()).then(|| ended(None)).flatten();
@@ -205,17 +234,33 @@ pub(super) fn driven(
     if standstill == StandstillSteering::Anywhere {
         return result;
     }
-    // Another path may be one that is free when it is smooth.
-    let share = budget.max_expansions.saturating_sub(result.expansions).min(EXPANSIONS);
-    let (mut spend, mut looks, mut found) = (share, PATHS, None);
+    let mut left = budget.max_expansions.saturating_sub(result.expansions);
+    let mut found = None;
     if result.covered.is_none() {
-        HybridAStar::new(planner.config()).first_accepted(problem, &mut spend, |path| {
-            looks -= 1;
-            found = smoothed(problem, path, Wanted { standstill, last_straight: 0.0, goal: None });
-            found.is_some() || looks == 0
-        });
+        let turning = Turning {
+            sharpness: sharpnesses(&problem.vehicle).last().copied().unwrap_or(f64::INFINITY),
+            at_changes: standstill == StandstillSteering::AtChanges,
+            deviation: deviation(problem),
+        };
+        let wanted = Wanted { standstill, last_straight: None, goal: Some(problem.goal) };
+        for (turning, most) in [(None, EXPANSIONS), (Some(turning), STEERED_EXPANSIONS)] {
+            let share = left.min(most);
+            let (mut spend, mut looks) = (share, PATHS);
+            steered::first_accepted(planner.config(), problem, turning, &mut spend, |joined| {
+                looks -= 1;
+                let continued = |turning| continued(problem, joined, turning, standstill);
+                // Gentler than it was found, if it can be.
+                found = smoothed(problem, &joined.arcs(), wanted)
+                    .or_else(|| turning.and_then(continued));
+                found.is_some() || looks == 0
+            });
+            left -= share - spend;
+            if found.is_some() {
+                break;
+            }
+        }
     }
-    let expansions = result.expansions + share - spend;
+    let expansions = budget.max_expansions.max(result.expansions) - left;
     let Some(driven) = found else { return PlanResult::none(NoPath::NotSmooth, expansions) };
     let searched = Guidance { preparatory: None, route: Route::Searched };
     let guidance = result.guidance.map(|_| searched);

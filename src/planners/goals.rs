@@ -8,6 +8,7 @@
 use super::contact;
 use super::continuous;
 use super::cost::CostModel;
+use super::leaving;
 use super::previous;
 pub use super::problem::Terms;
 use super::{Budget, NoPath, PlanResult, Planner, Problem, ProblemError};
@@ -151,6 +152,24 @@ impl<'a> Goal<'a> {
         self.model.forward.min(self.model.backward)
     }
 
+    /// What `planner` finds to the goal of `problem`: a way out of where the start is confined, or else a way in.
+    fn out_or_in(
+        &self,
+        planner: &mut dyn Planner,
+        problem: &Problem,
+        budget: Budget,
+    ) -> PlanResult {
+        let half = Budget { max_expansions: budget.max_expansions / 2, ..budget };
+        let out = leaving::plan(planner, self.scene, problem, &self.terms, half);
+        let spent = match out {
+            Some(out) if out.outcome.is_ok() => return out,
+            out => out.map_or(0, |out| out.expansions),
+        };
+        let max_expansions = budget.max_expansions - spent;
+        let result = contact::plan(planner, problem, Budget { max_expansions, ..budget });
+        PlanResult { expansions: spent + result.expansions, ..result }
+    }
+
     /// The cheapest path that `planner` finds there, exactly to the goal or within its tolerance, or
     /// why the car does not fit.
     fn plan(
@@ -170,7 +189,7 @@ impl<'a> Goal<'a> {
             return Ok(Ok(found(planner, problem, stays)));
         }
         let exact = self.exact()?.map(|problem| {
-            let result = contact::plan(planner, &problem, budget);
+            let result = self.out_or_in(planner, &problem, budget);
             found(planner, problem, result)
         });
         let mut expansions = exact.as_ref().map_or(0, |b| b.result.expansions);

@@ -289,39 +289,6 @@ impl HybridAStar {
         }
     }
 
-    /// Searches from the start to the goal and shows `accept` each path that it finds, in the order in which it
-    /// finds them, until that takes one.
-    pub(crate) fn first_accepted(
-        &mut self,
-        problem: &Problem,
-        expansions: &mut usize,
-        mut accept: impl FnMut(&Path) -> bool,
-    ) {
-        let goal = self.goal_set(problem);
-        let Ok(config) = self.config.for_search(&problem.vehicle) else { return };
-        let domains = config.domains(problem, problem.start, goal.pose);
-        let Self { queue, analytic, .. } = self;
-        // What became of it is with `accept`.
-        let _ = config.coarse_to_fine(&domains, expansions, |attempt, expansions| {
-            let model = &attempt.config.cost;
-            queue.begin(attempt, problem, problem.start, &goal);
-            while let Some(node) = queue.pop() {
-                if *expansions == 0 {
-                    return Err(NoPath::BudgetSpent);
-                }
-                *expansions -= 1;
-                let any = f64::INFINITY;
-                if queue.wants_curve(node)
-                    && let Some(leg) = close(queue, analytic, problem, &goal, node, any, model)
-                    && accept(&leg.path)
-                {
-                    return Ok(());
-                }
-                queue.expand(node, &goal, attempt.config, problem);
-            }
-            Err(queue.stop())
-        });
-    }
     /// Whether `path` passes something nearer than is comfortable, away from start and goal.
     pub(crate) fn passes_near(&self, problem: &Problem, path: &Path) -> bool {
         Nearness::new(problem, &self.cost(&problem.vehicle)).is_met_on_the_way(path)

@@ -6,8 +6,8 @@
 //! heuristics), [`analytic`] (Reeds-Shepp expansion) and [`cost`]. Its variants are
 //! [`PlainHybridAStar`] (no curves), [`MultiHeuristicHybridAStar`] and
 //! [`ScenarioHybridAStar`] (parallel spots). [`goals`] plans a scene with any of them: to the
-//! cheapest of its goals, and out of a contact (`contact`); `continuous` makes its path one that a car can
-//! follow, of the `shape` asked for. [`library`] does without any search; `approach`
+//! cheapest of its goals, out of a contact (`contact`), and out of a spot as into one (`leaving`); `continuous` makes its path one that a car can
+//! follow, of the `shape` asked for, or looks for another by a search with clothoids between its motions (`steered`, `transitions`). [`library`] does without any search; `approach`
 //! estimates the ways to its manoeuvres.
 
 pub mod analytic;
@@ -24,6 +24,7 @@ pub mod goals;
 pub mod hybrid_astar;
 mod joint;
 mod lattice;
+mod leaving;
 pub mod library;
 mod multi_heuristic;
 mod nearness;
@@ -36,6 +37,8 @@ mod scenario;
 mod search;
 mod shape;
 mod shortcut;
+mod steered;
+mod transitions;
 
 pub use analytic::AnalyticTail;
 pub use budget::{Budget, Effort};

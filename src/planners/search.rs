@@ -5,7 +5,7 @@
 //! way from a node to the goal is read off by walking up to the root. What is estimated is
 //! the cost from the start to the node.
 
-use crate::curves::Segment;
+use crate::curves::{Clothoid, Segment};
 use crate::geometry::{Aabb, Pose, wrap_angle};
 use crate::vehicle::{Gear, Vehicle};
 use crate::world::collision::{BodyFrame, Sweep};
@@ -19,6 +19,7 @@ use super::multi_heuristic::Guides;
 use super::nonholonomic::NonHolonomic;
 pub(super) use super::open::NodeIndex;
 use super::open::OpenList;
+use super::transitions::{Transitions, Turning};
 use super::{NoPath, Problem};
 
 /// In place of a primitive: the node is a root.
@@ -39,9 +40,9 @@ struct Node {
 
 /// A motion primitive.
 #[derive(Clone, Debug)]
-struct Primitive {
+pub(super) struct Primitive {
     /// The motion, forward in time.
-    segment: Segment,
+    pub segment: Segment,
     /// What the reversed motion sweeps.
     sweep: Sweep,
     /// Where the reversed motion ends, seen from where it begins.
@@ -63,6 +64,9 @@ pub(super) struct Search {
     weight: f32,
     /// What orders the other queues; `None` for a single queue.
     guides: Option<Guides>,
+    /// How the wheels turn between motions; `None` where the steering angle may jump.
+    turning: Option<Turning>,
+    transitions: Option<Transitions>,
     enclosed: bool,
     /// Expansions since a curve was last tried.
     since_curve: u32,
@@ -91,6 +95,11 @@ impl Search {
     pub fn guided(guides: Guides) -> Self {
         let open = OpenList::with_others(Guides::COUNT, guides.slack());
         Self { open, guides: Some(guides), ..Self::default() }
+    }
+
+    /// A search whose steering angle does not jump.
+    pub fn steered(turning: Turning) -> Self {
+        Self { turning: Some(turning), ..Self::default() }
     }
 
     /// Starts a search from `goal` to `start`.
@@ -146,6 +155,8 @@ impl Search {
                 self.primitives.push(Primitive { segment, sweep, end, steer });
             }
         }
+        let transitions = |turning| Transitions::new(turning, &self.primitives, vehicle, footprint);
+        self.transitions = self.turning.as_ref().map(transitions);
     }
 
     /// Estimates of curves for `vehicle` and the cost `model`.
@@ -210,6 +221,19 @@ impl Search {
         }
     }
 
+    /// The primitive with which the way from `node` to the goal begins; for a root the straight into the goal,
+    /// if it has one.
+    fn next(&self, node: NodeIndex, goal: &GoalSet) -> Option<usize> {
+        let n = &self.nodes[node as usize];
+        if n.primitive != ROOT {
+            return Some(n.primitive as usize);
+        }
+        let departure = goal.entries()[n.parent as usize].departure();
+        let same =
+            |p: &Primitive| Some(p.segment.gear()) == departure.gear && p.segment.curvature == 0.0;
+        self.primitives.iter().position(same)
+    }
+
     /// Generates the predecessors of `node`.
     pub fn expand(
         &mut self,
@@ -220,18 +244,28 @@ impl Search {
     ) {
         let parent = self.nodes[node as usize];
         let state = self.departure(node, goal);
-        let frame = BodyFrame::new(parent.pose);
+        let node_frame = BodyFrame::new(parent.pose);
+        let next = if self.turning.is_some() { self.next(node, goal) } else { None };
         for i in 0..self.primitives.len() {
             let p = &self.primitives[i];
+            let (mut frame, mut turn, mut length) = (node_frame, p.end.heading, p.segment.length);
+            let transition = self.transitions.as_ref().and_then(|t| t.between(i, next?));
+            if let Some(t) = transition {
+                frame = node_frame.compose(&t.end);
+                turn += t.turn;
+                length += t.motion.length;
+            }
             let position = frame.parent(p.end.position());
-            let heading = wrap_angle(parent.pose.heading + p.end.heading);
+            let heading = wrap_angle(parent.pose.heading + turn);
             let pose = Pose::new(position.x, position.y, heading);
             // Costs of changes are symmetric: the state after may stand for the one before.
-            let (step_cost, _) = config.cost.segment(state, p.segment.length, p.steer);
+            let (step_cost, _) = config.cost.segment(state, length, p.steer);
             let cost = parent.cost + step_cost as f32;
             let Some(lattice_state) = self.lattice.state(pose) else { continue };
+            let collision = &problem.collision;
             if cost >= self.lattice.cost(lattice_state)
-                || !problem.collision.sweep_is_free(&frame, &p.sweep)
+                || transition.is_some_and(|t| !t.is_free(&node_frame, collision))
+                || !collision.sweep_is_free(&frame, &self.primitives[i].sweep)
             {
                 continue;
             }
@@ -279,5 +313,21 @@ impl Search {
             n = &self.nodes[n.parent as usize];
         }
         (segments, n.parent as usize)
+    }
+
+    /// The motions from `node` to the goal with the transitions between them, in driving order.
+    pub fn continuous_way(&self, node: NodeIndex, goal: &GoalSet) -> Vec<Clothoid> {
+        let mut motions: Vec<Clothoid> = Vec::new();
+        let mut n = &self.nodes[node as usize];
+        while n.primitive != ROOT {
+            let primitive = n.primitive as usize;
+            motions.push(self.primitives[primitive].segment.into());
+            let next = self.next(n.parent, goal);
+            let transition = self.transitions.as_ref().and_then(|t| t.between(primitive, next?));
+            motions.extend(transition.map(|t| t.motion));
+            n = &self.nodes[n.parent as usize];
+        }
+        motions.extend(goal.entries()[n.parent as usize].rest.iter().map(|&s| Clothoid::from(s)));
+        motions
     }
 }

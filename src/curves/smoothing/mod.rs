@@ -74,8 +74,9 @@ pub struct Smoothing<'a> {
     /// |Change of curvature| per metre of the clothoids of each run, the part of a path from one change of
     /// gear to the next, 1/m².
     pub sharpness: &'a [f64],
-    /// The least length of the straight that the path ends with, metres; 0 for any end.
-    pub last_straight: f64,
+    /// The least length of the straight that the path ends with, metres; 0 for no more than straight wheels there.
+    /// `None` for any end.
+    pub last_straight: Option<f64>,
 }
 
 /// `path` with clothoids in place of its jumps of curvature, from the same start to `goal`; `None` where
@@ -155,18 +156,18 @@ fn pieces(path: &Path, smoothing: &Smoothing) -> Vec<Piece> {
             _ => border(Some(i - 1)),
         };
         let is_last = i + 1 == segments.len();
-        let last_straight = if is_last { smoothing.last_straight } else { 0.0 };
-        let end = match last_straight > 0.0 {
-            true => Some(0.0),
-            false => border((!is_last).then_some(i + 1)),
+        let last_straight = smoothing.last_straight.filter(|_| is_last);
+        let end = match last_straight {
+            Some(_) => Some(0.0),
+            None => border((!is_last).then_some(i + 1)),
         };
         let gear = s.gear().sign();
         let sharpness = smoothing.sharpness[run.min(smoothing.sharpness.len() - 1)];
         let straight =
             Piece { gear, curvature: 0.0, ends: [None; 2], sharpness, floor: 0.0, value: 0.0 };
+        let floor = last_straight.unwrap_or(0.0);
         if s.curvature == 0.0 {
-            let value = s.length.abs().max(last_straight);
-            pieces.push(Piece { value, floor: last_straight, ..straight });
+            pieces.push(Piece { value: s.length.abs().max(floor), floor, ..straight });
             continue;
         }
         let is_turn = |p: &Piece| !p.is_straight() || p.gear != gear;
@@ -177,8 +178,8 @@ fn pieces(path: &Path, smoothing: &Smoothing) -> Vec<Piece> {
         let turn = Piece { curvature, ends, value: s.turn().abs(), ..straight };
         pieces.push(Piece { value: turn.value.max(turn.least()), ..turn });
         let changes = segments.get(i + 1).is_some_and(|next| next.gear() != s.gear());
-        if end == Some(0.0) && (changes || last_straight > 0.0) {
-            pieces.push(Piece { value: last_straight, floor: last_straight, ..straight });
+        if end == Some(0.0) && (changes || last_straight.is_some()) {
+            pieces.push(Piece { value: floor, floor, ..straight });
         }
     }
     pieces
