@@ -134,6 +134,8 @@ fn more_is_kept_on_the_side_that_asks_for_more() {
     assert!(kept(&mirrored, -1.2) >= 0.5 - 1e-6);
     scene.margins = Some(Margins { left: 1.1, ..Margins::default() });
     assert!(planned(&scene).unwrap_err().contains("margins.left is 1.1"));
+    scene.margins = Some(Margins { mirrors: Some(0.1), ..Margins::default() });
+    assert!(planned(&scene).unwrap_err().contains("margins.mirrors is given without a contour"));
 }
 
 /// A car 2 m wide with its mirrors, 1.8 m without, whose front corners are cut.
@@ -171,6 +173,28 @@ fn a_contour_passes_where_its_rectangle_does_not() {
     assert!(planned(&rectangle).unwrap_err().contains("points["));
     let wide = Scene { vehicle: Vehicle::default(), ..scene };
     assert!(planned(&wide).unwrap_err().contains("contour[2]"));
+}
+
+#[test]
+fn mirrors_pass_where_the_sides_are_to_keep_more() {
+    // A gate of 2.1 m, for a car of 2 m with its mirrors.
+    let gate = |y: f64| vec![[4.0, y], [4.2, y], [4.2, 9.0 * y], [4.0, 9.0 * y]];
+    let mut scene = Scene {
+        vehicle: Vehicle { width: 2.0, ..Vehicle::default() },
+        start: Pose::new(-8.0, 0.0, 0.0),
+        goal: Pose::new(12.0, 0.0, 0.0),
+        obstacles: vec![gate(1.05), gate(-1.05)],
+        contour: CONTOUR.to_vec(),
+        margins: Some(Margins { left: 0.1, right: 0.1, ..Margins::default() }),
+        ..Scene::default()
+    };
+    assert!(planned(&scene).is_err());
+    let mirrors =
+        |m| Some(Margins { left: 0.1, right: 0.1, mirrors: Some(m), ..Margins::default() });
+    scene.margins = mirrors(0.02);
+    planned(&scene).unwrap();
+    scene.margins = mirrors(0.06);
+    assert!(planned(&scene).is_err());
 }
 
 proptest! {

@@ -286,8 +286,9 @@ unsafe fn to_request(request: &n3p_request) -> Result<Request> {
         // SAFETY: pairs of numbers are aligned as numbers are, and the caller's word.
         count => unsafe { read_all(request.contour.cast::<[f64; 2]>(), count, "contour") }?,
     };
-    let n3p_margins { front, rear, left, right } = request.margins;
-    let given = Margins { front, rear, left, right };
+    let n3p_margins { front, rear, left, right, mirrors } = request.margins;
+    let mirrors = (mirrors != 0.0).then_some(mirrors);
+    let given = Margins { front, rear, left, right, mirrors };
     let previous = match request.previous.is_null() {
         true => None,
         false => Some(PLANS.get(request.previous, "previous")?),

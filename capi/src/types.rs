@@ -258,6 +258,9 @@ pub struct n3p_margins {
     pub left: f64,
     /// On its right.
     pub right: f64,
+    /// Around its mirrors: what of the contour stands out farther to either side than the body does at
+    /// the rear axle; 0 for the sides'.
+    pub mirrors: f64,
 }
 
 /// What a plan came to.

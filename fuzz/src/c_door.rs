@@ -207,6 +207,7 @@ impl Calls<'_> {
                     rear: number(u)?,
                     left: number(u)?,
                     right: number(u)?,
+                    mirrors: number(u)?,
                 },
                 contour: contour.as_ptr(),
                 contour_count: usize::from(u8::arbitrary(u)? % 5),

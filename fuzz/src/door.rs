@@ -117,7 +117,8 @@ fn tried(u: &mut Unstructured) -> Result<()> {
         contour: if u8::arbitrary(u)? % 4 == 0 { some(u, 8, point)? } else { Vec::new() },
         margins: if u8::arbitrary(u)? % 4 == 0 {
             let [front, rear, left, right] = [number(u)?, number(u)?, number(u)?, number(u)?];
-            Some(Margins { front, rear, left, right })
+            let mirrors = if data_is_even(u) { Some(number(u)?) } else { None };
+            Some(Margins { front, rear, left, right, mirrors })
         } else {
             None
         },

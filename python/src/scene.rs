@@ -57,7 +57,8 @@ use crate::{json, plan};
 /// contour : array_like, shape (N, 2), optional
 ///     The car's outline in its own frame, within the rectangle of its sizes, where it is not all of that.
 /// margins : dict, optional
-///     Clearance on each side, ``front``, ``rear``, ``left`` and ``right``, metres, up to 1.
+///     Clearance on each side, ``front``, ``rear``, ``left`` and ``right``, and around the ``mirrors`` of the contour,
+///     metres, up to 1.
 /// start_steer : float
 ///     Angle of the front wheels at the start, radians.
 /// previous : Plan or dict, optional

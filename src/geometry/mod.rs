@@ -13,6 +13,7 @@ mod segment;
 pub use aabb::Aabb;
 pub use frame::Frame;
 pub(crate) use polygon::is_within;
+pub(crate) use polygon::part_within;
 pub use polygon::{Polygon, PolygonError};
 pub use polyline::Polyline;
 pub use pose::{Pose, signed_angle, wrap_angle};

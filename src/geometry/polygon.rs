@@ -79,6 +79,27 @@ pub(crate) fn is_within(p: Vec2, edges: impl Iterator<Item = (Vec2, Vec2)>) -> b
     inside
 }
 
+/// The part of a convex polygon inside `bx` (Sutherland & Hodgman 1974).
+pub(crate) fn part_within(polygon: Vec<Vec2>, bx: &Aabb) -> Vec<Vec2> {
+    // Each side as the signed distance to its inside.
+    let sides: [&dyn Fn(Vec2) -> f64; 4] =
+        [&|p| p.x - bx.min.x, &|p| bx.max.x - p.x, &|p| p.y - bx.min.y, &|p| bx.max.y - p.y];
+    sides.iter().fold(polygon, |polygon, inside| {
+        let mut kept = Vec::with_capacity(polygon.len() + 1);
+        for (i, &b) in polygon.iter().enumerate() {
+            let a = polygon[(i + polygon.len() - 1) % polygon.len()];
+            let (da, db) = (inside(a), inside(b));
+            if (da < 0.0) != (db < 0.0) {
+                kept.push(a + (b - a) * (da / (da - db)));
+            }
+            if db >= 0.0 {
+                kept.push(b);
+            }
+        }
+        kept
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -95,7 +95,7 @@ impl Default for Vehicle {
 
 /// A box in the vehicle's frame, larger by a margin on each side.
 fn grown(body: Aabb, margins: Margins) -> Aabb {
-    let Margins { front, rear, left, right } = margins;
+    let [front, rear, left, right] = margins.sides();
     Aabb { min: body.min - Vec2::new(rear, right), max: body.max + Vec2::new(front, left) }
 }
 
@@ -197,7 +197,8 @@ impl Vehicle {
     /// The footprint in the vehicle's own frame, grown by a margin on every side, metres.
     pub fn footprint(&self, margins: impl Into<Margins>) -> Aabb {
         let half = self.width / 2.0;
-        grown(Aabb::new(-self.rear_overhang, -half, self.front_extent(), half), margins.into())
+        let body = Aabb::new(-self.rear_overhang, -half, self.front_extent(), half);
+        grown(body, margins.into().of_everything())
     }
 
     /// The rectangle around the four wheels where they stand, grown like [`Vehicle::footprint`]: what must keep off

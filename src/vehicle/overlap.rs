@@ -1,6 +1,6 @@
 //! How much of one footprint another covers.
 
-use crate::geometry::{Aabb, Pose, Vec2};
+use crate::geometry::{Pose, Vec2, part_within};
 
 use super::Vehicle;
 
@@ -10,29 +10,8 @@ impl Vehicle {
         let body = self.footprint(0.0);
         let seen = goal.relative(pose);
         let corners = body.corners().map(|c| seen.point_to_parent(c));
-        area(&clip(corners.to_vec(), &body)) / area(&body.corners())
+        area(&part_within(corners.to_vec(), &body)) / area(&body.corners())
     }
-}
-
-/// The part of a convex polygon inside `bx` (Sutherland & Hodgman 1974).
-fn clip(polygon: Vec<Vec2>, bx: &Aabb) -> Vec<Vec2> {
-    // Each side as the signed distance to its inside.
-    let sides: [&dyn Fn(Vec2) -> f64; 4] =
-        [&|p| p.x - bx.min.x, &|p| bx.max.x - p.x, &|p| p.y - bx.min.y, &|p| bx.max.y - p.y];
-    sides.iter().fold(polygon, |polygon, inside| {
-        let mut kept = Vec::with_capacity(polygon.len() + 1);
-        for (i, &b) in polygon.iter().enumerate() {
-            let a = polygon[(i + polygon.len() - 1) % polygon.len()];
-            let (da, db) = (inside(a), inside(b));
-            if (da < 0.0) != (db < 0.0) {
-                kept.push(a + (b - a) * (da / (da - db)));
-            }
-            if db >= 0.0 {
-                kept.push(b);
-            }
-        }
-        kept
-    })
 }
 
 /// Area of a counter-clockwise polygon (shoelace formula).

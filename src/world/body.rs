@@ -17,12 +17,17 @@ impl Scene {
     pub(super) fn check_contour(&self) -> Result<(), InvalidField> {
         let invalid = |field: String, message: String| Err(InvalidField { field, message });
         let margins = self.margins.unwrap_or_default();
-        for (name, side) in Margins::NAMES.iter().zip(margins.sides()) {
+        let all = margins.sides().into_iter().chain(margins.mirrors);
+        for (name, side) in Margins::NAMES.iter().zip(all) {
             let most = Self::MAX_MARGIN;
             if !(0.0..=most).contains(&side) {
                 let message = format!("is {side}; expected a number from 0 to {most} m");
                 return invalid(format!("margins.{name}"), message);
             }
+        }
+        if margins.mirrors.is_some() && self.contour.is_empty() {
+            let message = "is given without a contour; expected one that has mirrors".to_owned();
+            return invalid("margins.mirrors".to_owned(), message);
         }
         let body = self.vehicle.footprint(Self::CONTOUR_SLACK);
         for (i, &[x, y]) in self.contour.iter().enumerate() {

@@ -255,9 +255,10 @@ fn wrong_tolerance(value: &Value) -> Option<(String, String)> {
     wrong_numbers("goal_tolerance", value, &["position_m", "heading_rad"], shape)
 }
 
-/// What is wrong with margins that are not up to four numbers.
+/// What is wrong with margins that are not up to five numbers.
 fn wrong_margins(value: &Value) -> Option<(String, String)> {
-    let shape = r#"{"front": metres, "rear": metres, "left": metres, "right": metres}"#;
+    let shape =
+        r#"{"front": metres, "rear": metres, "left": metres, "right": metres, "mirrors": metres}"#;
     wrong_numbers("margins", value, &Margins::NAMES, shape)
 }
 

@@ -7,7 +7,7 @@
 use std::f64::consts::TAU;
 
 use crate::curves::Segment;
-use crate::geometry::{Vec2, is_within};
+use crate::geometry::{Aabb, Vec2, is_within, part_within};
 use crate::vehicle::Margins;
 
 /// An outline as convex pieces, counter-clockwise, in the vehicle's frame.
@@ -58,15 +58,45 @@ impl Contour {
         }
     }
 
-    /// The same, larger by a margin on each side.
+    /// The same, larger by a margin on each side, and the mirrors by theirs.
     pub fn grown(&self, margins: Margins) -> Self {
-        let [front, rear, left, right] = margins.sides();
-        let shifts = [(front, left), (front, -right), (-rear, left), (-rear, -right)];
-        let grow = |piece: &Vec<Vec2>| {
+        let grown = |piece: &Vec<Vec2>, margins: Margins| {
+            let [front, rear, left, right] = margins.sides();
+            let shifts = [(front, left), (front, -right), (-rear, left), (-rear, -right)];
             let corners = piece.iter().flat_map(|v| shifts.map(|(x, y)| v + Vec2::new(x, y)));
             hull(corners.collect())
         };
-        Self { pieces: self.pieces.iter().map(grow).collect() }
+        let Some(beside_mirrors) = margins.mirrors else {
+            return Self { pieces: self.pieces.iter().map(|p| grown(p, margins)).collect() };
+        };
+        /// What stands out by less is no mirror.
+        const SLIVER: f64 = 1e-6;
+        let far = f64::INFINITY;
+        let [right, left] = self.sides_at_rear_axle();
+        let part = |[min, max]: [f64; 2], margins: Margins| {
+            let strip = Aabb::new(-far, min, far, max);
+            let parts = self.pieces.iter().map(move |piece| part_within(piece.clone(), &strip));
+            parts.filter(|part| part.len() > 2).map(move |part| grown(&part, margins))
+        };
+        let body = part([right, left], margins);
+        let mirrors = [[-far, right - SLIVER], [left + SLIVER, far]];
+        let mirrors = mirrors.into_iter().flat_map(|side| part(side, beside_mirrors.into()));
+        Self { pieces: body.chain(mirrors).collect() }
+    }
+
+    /// The least and the greatest y of the outline abreast of the rear axle.
+    fn sides_at_rear_axle(&self) -> [f64; 2] {
+        let mut sides = [0.0, 0.0];
+        for piece in &self.pieces {
+            for (i, &a) in piece.iter().enumerate() {
+                let b = piece[(i + 1) % piece.len()];
+                if a.x * b.x <= 0.0 && a.x != b.x {
+                    let y = a.y + (b.y - a.y) * a.x / (a.x - b.x);
+                    sides = [f64::min(sides[0], y), f64::max(sides[1], y)];
+                }
+            }
+        }
+        sides
     }
 
     /// The outline of the car's mirror image.
@@ -238,6 +268,24 @@ mod tests {
         let grown = car.grown(front);
         let at = |x, y| grown.touches(Vec2::new(x, y), Vec2::new(x, y));
         assert!(at(3.89, 0.0) && !at(3.91, 0.0) && !at(-1.01, 0.0) && at(2.35, 1.05));
+    }
+
+    #[test]
+    fn mirrors_have_a_margin_of_their_own() {
+        let car = Contour::new(&CAR).unwrap();
+        let margins = Margins { left: 0.3, mirrors: Some(0.05), ..Margins::default() };
+        for (car, side) in
+            [(car.grown(margins), 1.0), (car.mirrored().grown(margins.mirrored()), -1.0)]
+        {
+            let at = |x: f64, y: f64| car.touches(Vec2::new(x, y * side), Vec2::new(x, y * side));
+            // The body to the left, the mirrors on both sides, and nothing between a mirror and its margin.
+            assert!(at(0.0, 1.19) && !at(0.0, 1.21) && !at(0.0, -0.91));
+            assert!(at(2.1, 1.149) && at(2.1, 1.19) && !at(2.1, 1.21), "the body's is wider");
+            assert!(at(2.1, -1.149) && !at(2.1, -1.151) && at(2.24, -1.1) && !at(2.6, -0.95));
+        }
+        // As wide as the sides' where it is not given.
+        let alike = car.grown(Margins { left: 0.3, ..Margins::default() });
+        assert!(alike.touches(Vec2::new(2.1, 1.39), Vec2::new(2.1, 1.39)));
     }
 
     #[test]
