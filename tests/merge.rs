@@ -42,7 +42,7 @@ fn parts_collected_in_folders_of_their_own_make_the_whole() {
         assert_eq!(mine.len(), 2);
         for (name, bytes) in files(own.path()) {
             let named = |file: &&str| name.starts_with(file.trim_end_matches(".parquet"));
-            assert!(name == "metadata.json" || mine.iter().any(|file| named(&file)), "{name}");
+            assert!(name == "metadata.json" || mine.iter().any(|file| named(file)), "{name}");
             fs::write(merged.path().join(name), bytes).unwrap();
         }
     }
