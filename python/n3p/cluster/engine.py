@@ -119,6 +119,10 @@ class _Run:
 
     def all(self, tasks: list[Task]) -> bool:
         todo = collections.deque((task, 1) for task in tasks)
+        largest = max(node["Resources"].get("CPU", 0) for node in self.ray.nodes() if node["Alive"])
+        if largest < self.options.cpus:
+            # One may yet join.
+            self.progress.say(f"waiting for a machine with {self.options.cpus} processors")
         try:
             while todo or self.running:
                 # Some more than can run at once, so that no machine waits; not all of many.
