@@ -41,8 +41,8 @@ fn parts_collected_in_folders_of_their_own_make_the_whole() {
             all.shards.iter().filter(|s| s.part == part).map(|s| s.file.as_str()).collect();
         assert_eq!(mine.len(), 2);
         for (name, bytes) in files(own.path()) {
-            let named = |file: &&str| name.starts_with(file.trim_end_matches(".parquet"));
-            assert!(name == "metadata.json" || mine.iter().any(|file| named(file)), "{name}");
+            let is_its = |file: &&str| name.starts_with(file.trim_end_matches(".parquet"));
+            assert!(name == "metadata.json" || mine.iter().any(is_its), "{name}");
             fs::write(merged.path().join(name), bytes).unwrap();
         }
     }
