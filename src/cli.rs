@@ -28,6 +28,9 @@ pub use maps::{MapArgs, Unknown, vehicle};
 /// Exit code of a planner that found no path.
 pub const EXIT_NO_PATH: u8 = 3;
 
+/// What `--version` says: of which release and revision a program is, so that machines that share work can tell.
+pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("N3P_GIT_REVISION"), ")");
+
 /// Marks an error as the user's to mend: exit code 2.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]

@@ -54,6 +54,26 @@ fn shards_make_the_same_records_in_any_number_of_runs() {
     assert_eq!(results(&parts), expected);
     assert_eq!(fs::read(path(4)).unwrap(), kept);
 
+    let merge = ["--out", "parts", "--merge"];
+    volume(dir.path(), &merge).success().stdout(contains("7 of 7"));
+    let intact = fs::read_to_string(path(5)).unwrap();
+    let spoilt = [
+        (None, "shard-000005.json is missing"),
+        (Some(intact.replacen("\"scenes\": ", "\"scenes\": 1", 1)), "is damaged: it has not"),
+        (Some(fs::read_to_string(path(3)).unwrap()), "is foreign: it is the record of shard 3"),
+    ];
+    for (text, why) in spoilt {
+        fs::remove_file(path(5)).unwrap_or_default();
+        text.map_or(Ok(()), |text| fs::write(path(5), text)).unwrap();
+        volume(dir.path(), &merge).code(2).stderr(contains(why));
+    }
+    volume(dir.path(), &["--out", "parts", "--status"])
+        .success()
+        .stdout(contains(r#"{"part":6,"file":"shard-000005.json","state":"foreign","why":"#))
+        .stdout(contains(r#"{"parts":7,"#));
+    fs::write(path(5), intact).unwrap();
+    assert_eq!(results(&parts), expected);
+
     volume(dir.path(), &["--out", "parts", "--set", "seed=10"])
         .code(2)
         .stderr(contains("records of another configuration"));

@@ -7,7 +7,9 @@ use std::time::Instant;
 use clap::Parser;
 use n3p::cli::{self, BadInput, OrBadInput};
 use n3p::files;
-use n3p::lab::dataset::{self, CollectConfig, CollectOptions, Dataset, Part, TypeReport};
+use n3p::lab::dataset::{
+    self, CollectConfig, CollectError, CollectOptions, Part, Summary, TypeReport,
+};
 use n3p::lab::progress;
 use n3p::toml_file::Setting;
 use n3p::vehicle::Vehicle;
@@ -17,7 +19,7 @@ use n3p::world::ParkingType;
 ///
 /// May be interrupted at any moment; --resume then ends with the same bytes.
 #[derive(Parser)]
-#[command(version)]
+#[command(version = cli::VERSION)]
 struct Args {
     /// Parking type; forward, reverse and parallel when omitted
     #[arg(long = "type", value_name = "TYPE")]
@@ -40,6 +42,13 @@ struct Args {
     /// Collect only every n-th file, from the i-th on, as one of n processes
     #[arg(long, value_name = "I/N", default_value_t)]
     shard: Part,
+    /// Collect nothing: say as JSON what the folder holds of each file
+    #[arg(long, conflicts_with_all = ["resume", "shard"])]
+    status: bool,
+    /// Collect nothing: put together what the n processes of --shard left, and refuse what is missing,
+    /// damaged or another's
+    #[arg(long, conflicts_with_all = ["status", "resume", "shard"])]
+    merge: bool,
     /// Worker threads; 0 for one per core
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u16).range(..=1024))]
     threads: u16,
@@ -58,13 +67,19 @@ fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let kinds = args.kind.map_or(ParkingType::SQUARE.to_vec(), |kind| vec![kind]);
     let options = CollectOptions { resume: args.resume, part: args.shard };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.into()).build()?;
+    if args.status {
+        let shards = pool.install(|| dataset::shards(&config, &args.out, &kinds));
+        cli::print(shards.map_err(exit_code)?.to_json())?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let begin = Instant::now();
     let bar = progress::bar(0, "collect");
-    let result = pool.install(|| dataset::collect(&config, &args.out, &kinds, options, &bar));
+    let result = pool.install(|| match args.merge {
+        true => dataset::merge(&config, &args.out, &kinds),
+        false => dataset::collect(&config, &args.out, &kinds, options, &bar),
+    });
     bar.finish_and_clear();
-    let reports = result.map_err(|e| {
-        if e.is_bad_input() { BadInput(e.to_string()).into() } else { anyhow::Error::from(e) }
-    })?;
+    let reports = result.map_err(exit_code)?;
     let seconds = begin.elapsed().as_secs_f64();
     for report in &reports {
         cli::print(summary(report))?;
@@ -72,19 +87,26 @@ fn run(args: &Args) -> anyhow::Result<ExitCode> {
     cli::print(format!("{}: {seconds:.1} s", args.out.display()))?;
     if reports.iter().all(|r| r.missing_shards == 0) {
         // Read back: what is on the disk counts.
-        let data = Dataset::read_types(&args.out, &kinds)?;
-        cli::print(format!("checksum of settings and rows: {}", data.content_sha256(&kinds)))?;
-        write_card(&args.out)?;
+        let set = Summary::read(&args.out, &kinds)?;
+        cli::print(format!("checksum of settings and rows: {}", set.sha256))?;
+        write_card(&args.out, set)?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
+fn exit_code(error: CollectError) -> anyhow::Error {
+    if error.is_bad_input() { BadInput(error.to_string()).into() } else { error.into() }
+}
+
 /// Writes the card of all the types that are complete.
-fn write_card(folder: &Path) -> anyhow::Result<()> {
+fn write_card(folder: &Path, collected: Summary) -> anyhow::Result<()> {
     let is_complete = |kind: &ParkingType| dataset::manifest::manifest_path(folder, *kind).exists();
     let kinds: Vec<ParkingType> = ParkingType::ALL.into_iter().filter(is_complete).collect();
-    let set = Dataset::read_types(folder, &kinds)?;
-    let card = dataset::card::card(&set, &set.content_sha256(&kinds));
+    let set = match kinds.iter().all(|kind| collected.kinds.contains_key(kind)) {
+        true => collected,
+        false => Summary::read(folder, &kinds)?,
+    };
+    let card = dataset::card::card(&set);
     files::write_whole(&folder.join("card.md"), card.as_bytes())?;
     Ok(())
 }

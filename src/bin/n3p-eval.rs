@@ -23,7 +23,7 @@ use n3p::world::{Level, ParkingType};
 
 /// Evaluates planning methods on generated scenes, or on a folder of scene files.
 #[derive(Parser)]
-#[command(version)]
+#[command(version = cli::VERSION)]
 struct Args {
     /// A trained model; may be given several times. Bare names are looked for in the
     /// working folder, then in models/ [default: what the methods named need, such as

@@ -17,7 +17,7 @@ use n3p::vehicle::Vehicle;
 
 /// Runs experiments: collect, train, evaluate and report, all from one file.
 #[derive(Parser)]
-#[command(version)]
+#[command(version = cli::VERSION)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -67,6 +67,13 @@ struct VolumeArgs {
     /// The share of this process, such as 2/3; the run that finds all shards finished writes the table.
     #[arg(long, default_value_t, value_name = "I/N")]
     shard: Part,
+    /// Plan nothing: say as JSON what --out holds of each shard.
+    #[arg(long, conflicts_with_all = ["shard", "samples", "write_scene"])]
+    status: bool,
+    /// Plan nothing: put together what the n processes of --shard left, and refuse what is missing, damaged
+    /// or another's.
+    #[arg(long, conflicts_with_all = ["status", "shard", "samples", "write_scene"])]
+    merge: bool,
     /// Worker threads; they disturb times, never results.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
@@ -205,13 +212,19 @@ fn run_volume(args: &VolumeArgs) -> Result<ExitCode> {
         samples: args.samples.clone(),
         sample_every: args.sample_every,
     };
-    let totals = volume::run(&config, &out, &options).map_err(|error: VolumeError| {
-        if error.is_bad_input() {
-            BadInput(error.to_string()).into()
-        } else {
-            anyhow::Error::from(error)
-        }
-    })?;
+    let failed = |error: VolumeError| match error.is_bad_input() {
+        true => BadInput(error.to_string()).into(),
+        false => anyhow::Error::from(error),
+    };
+    if args.status {
+        cli::print(volume::shards(&config, &out).map_err(failed)?.to_json())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let totals = match args.merge {
+        true => volume::merge(&config, &out),
+        false => volume::run(&config, &out, &options),
+    };
+    let totals = totals.map_err(failed)?;
     cli::print(totals.markdown().trim_end())?;
     cli::print(format!("{}: {} of {} shards finished", out.display(), totals.shards, totals.of))?;
     Ok(if totals.is_clean() { ExitCode::SUCCESS } else { ExitCode::FAILURE })

@@ -28,7 +28,7 @@ use n3p::world::maps::Geographic;
 ///
 /// Exit code 0: a path was found; 3: there is none (the reason is printed).
 #[derive(Parser)]
-#[command(version)]
+#[command(version = cli::VERSION)]
 struct Args {
     /// The scene, .json or TPCAP .csv.
     #[arg(long, value_name = "FILE", required_unless_present_any = ["list_models", "map"])]

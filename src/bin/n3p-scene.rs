@@ -19,7 +19,7 @@ use n3p::world::{Level, ParkingType, Scene};
 
 /// Makes files of scenes, and reads maps.
 #[derive(Parser)]
-#[command(version)]
+#[command(version = cli::VERSION)]
 struct Cli {
     #[command(subcommand)]
     command: Command,

@@ -20,7 +20,7 @@ use n3p::world::ParkingType;
 
 /// Trains selectors from data sets, and driving policies; each becomes one model file.
 #[derive(Parser)]
-#[command(version)]
+#[command(version = cli::VERSION)]
 struct Cli {
     #[command(subcommand)]
     command: Command,

@@ -3,6 +3,7 @@
 //! In reading order; each uses those above it and the planner, never one below.
 //!
 //! - [`progress`]: progress bars
+//! - [`shards`]: work that processes share, and what a folder holds of it
 //! - [`nn`]: pieces of neural networks
 //! - [`rl`]: policies of reinforcement learning
 //! - [`dataset`]: collecting samples into Parquet, and reading them back
@@ -19,5 +20,6 @@ pub mod experiments;
 pub mod nn;
 pub mod progress;
 pub mod rl;
+pub mod shards;
 pub mod training;
 pub mod volume;

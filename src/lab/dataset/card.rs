@@ -4,41 +4,33 @@
 
 use std::fmt::Write;
 
-use super::{Dataset, Metadata, Sample, Status};
+use super::summary::Counts;
+use super::{Metadata, Status, Summary};
 use crate::world::ParkingType;
 use crate::world::cell::Axis;
 
 pub(in crate::lab) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// The card of a data set with this checksum.
-pub fn card(set: &Dataset, sha256: &str) -> String {
-    let of = |kind: ParkingType| set.samples.iter().filter(move |s| s.cell.kind() == kind);
+/// The card of a data set.
+pub fn card(set: &Summary) -> String {
     let kinds: Vec<ParkingType> =
-        ParkingType::ALL.into_iter().filter(|kind| of(*kind).next().is_some()).collect();
-    let rows = |&kind: &ParkingType| {
-        (kind, of(kind).count(), of(kind).filter(|s| s.status == Status::Solved).count())
-    };
-    let rows: Vec<_> = kinds.iter().map(rows).collect();
+        ParkingType::ALL.into_iter().filter(|kind| set.kinds.contains_key(kind)).collect();
+    let rows: Vec<_> = kinds
+        .iter()
+        .map(|kind| (*kind, set.kinds[kind].rows() as usize, set.kinds[kind].solved() as usize))
+        .collect();
     let (mut ends, mut paths) = (String::new(), String::new());
-    for &kind in &kinds {
-        let count = |status| of(kind).filter(|s| s.status == status).count().to_string();
-        let counts = Status::ALL.map(count).join(" | ");
+    for kind in &kinds {
+        let tally = &set.kinds[kind];
+        let counts = tally.statuses.map(|count| count.to_string()).join(" | ");
         let _ = writeln!(ends, "| {kind} | {counts} |");
-        let solved: Vec<&Sample> = of(kind).filter(|s| s.status == Status::Solved).collect();
-        let quantiles = |value: fn(&Sample) -> f64| {
-            let mut values: Vec<f64> = solved.iter().map(|s| value(s)).collect();
-            values.sort_by(f64::total_cmp);
-            let at = |share: f64| values.get((share * (values.len().max(1) - 1) as f64) as usize);
-            [0.05, 0.5, 0.95].map(|share| at(share).map_or("–".to_owned(), |v| format!("{v:.1}")))
+        let quantiles = |counts: &Counts| {
+            let at = |share| counts.quantile(share).map_or("–".to_owned(), |v| format!("{v:.1}"));
+            [0.05, 0.5, 0.95].map(at).join(" / ")
         };
-        let columns = [
-            quantiles(|s| s.start.x),
-            quantiles(|s| s.path_length),
-            quantiles(|s| f64::from(s.direction_changes)),
-            quantiles(|s| f64::from(s.expansions)),
-        ];
-        let columns = columns.map(|of| of.join(" / ")).join(" | ");
-        let _ = writeln!(paths, "| {kind} | {columns} |");
+        let columns =
+            [&tally.start_x, &tally.path_length, &tally.direction_changes, &tally.expansions];
+        let _ = writeln!(paths, "| {kind} | {} |", columns.map(quantiles).join(" | "));
     }
     let statuses = Status::ALL.map(|status| format!("`{}`", status.name())).join(" | ");
     let kinds: Vec<&str> = kinds.iter().map(|kind| spots(*kind)).collect();
@@ -74,7 +66,7 @@ Of the solved ones, 5 % / median / 95 %:
 {paths}",
         kinds = kinds.join(", "),
         vehicle = vehicle(&set.metadata),
-        data = data(&set.metadata, sha256, &rows),
+        data = data(&set.metadata, &set.sha256, &rows),
     )
 }
 

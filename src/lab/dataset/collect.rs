@@ -15,8 +15,8 @@ use rayon::prelude::*;
 
 use super::config::{CollectConfig, ConfigError};
 use super::manifest::{
-    Manifest, ShardRecord, known_shards, manifest_path, metadata_path, record_path, shard_name,
-    to_json,
+    Manifest, ShardRecord, complete, known_shards, manifest_path, metadata_path, record_path,
+    shard_name, to_json,
 };
 use super::part::Part;
 use super::read::{DatasetError, read_metadata};
@@ -24,6 +24,7 @@ use super::sampler::Sampler;
 use super::schema::{Difference, Metadata, Sample};
 use super::write::encode;
 use crate::files::{TEMPORARY, reason, remove_if_present, write_whole};
+use crate::lab::shards::Unfinished;
 use crate::world::ParkingType;
 
 /// How a collection runs; none of it changes the bytes.
@@ -50,6 +51,20 @@ pub struct TypeReport {
     pub collected_rows: u64,
     /// Shards that still lack; 0 when the type is complete.
     pub missing_shards: usize,
+}
+
+impl TypeReport {
+    /// Of shards that are listed in `manifest`.
+    pub(super) fn new(manifest: &Manifest, collected_rows: u64, missing_shards: usize) -> Self {
+        Self {
+            kind: manifest.parking_type,
+            rows: manifest.rows,
+            solved: manifest.solved,
+            bytes: manifest.shards.iter().map(|s| s.bytes).sum(),
+            collected_rows,
+            missing_shards,
+        }
+    }
 }
 
 /// Why a collection ended early.
@@ -109,6 +124,9 @@ pub enum CollectError {
         /// Version or revision of both builds.
         difference: Difference,
     },
+    /// Shards to merge are not there, damaged or another's.
+    #[error(transparent)]
+    Unfinished(#[from] Unfinished),
     /// A file could not be written or removed.
     #[error("{path}: cannot be written: {}", reason(source))]
     Write {
@@ -219,7 +237,7 @@ struct Run<'a> {
 /// A type before its collection.
 struct TypeState {
     kind: ParkingType,
-    /// Finished shards, of all parts.
+    /// Finished shards; those of other parts by their records alone.
     done: BTreeMap<usize, ShardRecord>,
     /// Shards of this part to collect.
     todo: Vec<usize>,
@@ -236,18 +254,25 @@ impl Run<'_> {
                 return Err(CollectError::Exists { path: self.folder.to_owned(), kind });
             }
         }
-        let done = self.done(kind);
+        let done = self.done(kind, |shard| self.options.part.contains(shard));
         let todo = mine.filter(|shard| !done.contains_key(shard)).collect();
         Ok(TypeState { kind, done, todo })
     }
 
-    /// The shards of a type whose bytes have the checksum on record.
-    fn done(&self, kind: ParkingType) -> BTreeMap<usize, ShardRecord> {
+    /// The shards of a type that are on record and there; of those to `check`, whose bytes have the checksum.
+    fn done(
+        &self,
+        kind: ParkingType,
+        check: impl Fn(usize) -> bool + Sync,
+    ) -> BTreeMap<usize, ShardRecord> {
         known_shards(self.folder, self.metadata, kind)
             .into_par_iter()
             .filter(|(shard, record)| {
-                let bytes = fs::read(self.folder.join(shard_name(kind, *shard)));
-                bytes.is_ok_and(|bytes| record.fits(&bytes))
+                let path = self.folder.join(shard_name(kind, *shard));
+                match check(*shard) {
+                    true => fs::read(path).is_ok_and(|bytes| record.fits(&bytes)),
+                    false => path.exists(),
+                }
             })
             .collect()
     }
@@ -273,21 +298,22 @@ impl Run<'_> {
             self.progress.set_message(shard_name(kind, *shard));
             collected_rows += self.collect_shard(kind, *shard, make_solver)?.rows;
         }
-        // Other parts may have gone on meanwhile.
-        let done = if todo.is_empty() { before } else { self.done(kind) };
-        let missing_shards = self.metadata.shard_count(kind) - done.len();
+        let count = self.metadata.shard_count(kind);
+        let done = match todo.is_empty() && self.options.part == Part::ALL {
+            true => before,
+            // Other parts may have gone on meanwhile. Only who finds all there reads what they wrote.
+            false => match self.done(kind, |_| false) {
+                all if all.len() == count => self.done(kind, |_| true),
+                some => some,
+            },
+        };
+        let missing_shards = count - done.len();
         let manifest = Manifest::new(kind, done.into_values().collect());
         if missing_shards == 0 {
-            self.complete(&manifest)?;
+            complete(self.folder, &manifest)
+                .map_err(|(path, source)| CollectError::Write { path, source })?;
         }
-        Ok(TypeReport {
-            kind,
-            rows: manifest.rows,
-            solved: manifest.solved,
-            bytes: manifest.shards.iter().map(|s| s.bytes).sum(),
-            collected_rows,
-            missing_shards,
-        })
+        Ok(TypeReport::new(&manifest, collected_rows, missing_shards))
     }
 
     fn collect_shard<S>(
@@ -318,20 +344,6 @@ impl Run<'_> {
         self.write(&path, &bytes)?;
         self.write(&record_path(self.folder, kind, shard), &to_json(&record))?;
         Ok(record)
-    }
-
-    /// Writes the manifest and removes the records that it replaces.
-    fn complete(&self, manifest: &Manifest) -> Result<(), CollectError> {
-        let kind = manifest.parking_type;
-        let path = manifest_path(self.folder, kind);
-        let bytes = to_json(manifest);
-        if fs::read(&path).ok().as_deref() != Some(&bytes) {
-            self.write(&path, &bytes)?;
-        }
-        for shard in 0..manifest.shards.len() {
-            self.remove(record_path(self.folder, kind, shard))?;
-        }
-        Ok(())
     }
 
     /// Removes the temporary files that killed runs of this part left of a type.

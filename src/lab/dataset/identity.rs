@@ -11,17 +11,35 @@ pub fn content_sha256<'a>(
     metadata: &Metadata,
     samples: impl IntoIterator<Item = &'a Sample>,
 ) -> String {
-    let mut hash = Sha256::new();
-    hash.update(metadata.settings().to_string());
+    let mut hash = ContentHash::new(metadata);
     let mut samples: Vec<&Sample> = samples.into_iter().collect();
     samples.sort_by_key(|s| (s.cell.kind(), s.cell_index, s.sample_index));
-    let mut row = Vec::new();
-    for sample in samples {
-        row.clear();
-        write(sample, &mut row);
-        hash.update(&row);
+    samples.into_iter().for_each(|sample| hash.push(sample));
+    hash.finish()
+}
+
+/// [`content_sha256`] of rows that come one after the other, in its order.
+pub(super) struct ContentHash {
+    hash: Sha256,
+    row: Vec<u8>,
+}
+
+impl ContentHash {
+    pub(super) fn new(metadata: &Metadata) -> Self {
+        let mut hash = Sha256::new();
+        hash.update(metadata.settings().to_string());
+        Self { hash, row: Vec::new() }
     }
-    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+
+    pub(super) fn push(&mut self, sample: &Sample) {
+        self.row.clear();
+        write(sample, &mut self.row);
+        self.hash.update(&self.row);
+    }
+
+    pub(super) fn finish(self) -> String {
+        self.hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+    }
 }
 
 /// Appends every column that the settings and the place in the grid leave open.

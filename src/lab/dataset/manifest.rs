@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
 use super::schema::{Metadata, Sample, Status};
-use crate::files::sha256_hex;
+use crate::files::{remove_if_present, sha256_hex, write_whole};
 use crate::world::ParkingType;
 
 /// The settings that all files of a data set share.
@@ -49,20 +50,25 @@ pub struct ShardRecord {
 impl ShardRecord {
     /// The record of a file with these rows and bytes.
     pub fn new(file: String, samples: &[Sample], bytes: &[u8]) -> Self {
-        let solved = samples.iter().filter(|s| s.status == Status::Solved).count();
-        Self {
-            file,
-            rows: samples.len() as u64,
-            solved: solved as u64,
-            bytes: bytes.len() as u64,
-            sha256: sha256_hex(&[bytes]),
-        }
+        let [rows, solved] = counts(samples);
+        Self { file, rows, solved, bytes: bytes.len() as u64, sha256: sha256_hex(&[bytes]) }
     }
 
     /// Whether `bytes` are the file's.
     pub fn fits(&self, bytes: &[u8]) -> bool {
         self.bytes == bytes.len() as u64 && self.sha256 == sha256_hex(&[bytes])
     }
+
+    /// Whether it counts `samples` right.
+    pub fn counts_fit(&self, samples: &[Sample]) -> bool {
+        [self.rows, self.solved] == counts(samples)
+    }
+}
+
+/// All rows, and the solved ones.
+fn counts(samples: &[Sample]) -> [u64; 2] {
+    let solved = samples.iter().filter(|s| s.status == Status::Solved).count();
+    [samples.len() as u64, solved as u64]
 }
 
 /// All shards of one parking type, in order. Its presence means that they are complete.
@@ -129,6 +135,20 @@ pub(super) fn known_shards(
         known.extend(manifest.shards.into_iter().enumerate());
     }
     known
+}
+
+/// Writes the manifest and removes the records that it replaces; an error with its file.
+pub(super) fn complete(folder: &Path, manifest: &Manifest) -> Result<(), (PathBuf, io::Error)> {
+    let kind = manifest.parking_type;
+    let path = manifest_path(folder, kind);
+    let bytes = to_json(manifest);
+    if fs::read(&path).ok().as_deref() != Some(&bytes) {
+        write_whole(&path, &bytes).map_err(|e| (path, e))?;
+    }
+    (0..manifest.shards.len()).try_for_each(|shard| {
+        let path = record_path(folder, kind, shard);
+        remove_if_present(&path).map_err(|e| (path, e))
+    })
 }
 
 fn read_json<T: for<'de> Deserialize<'de>>(path: &Path) -> Option<T> {

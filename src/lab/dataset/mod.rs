@@ -14,7 +14,7 @@
 //!
 //! [`schema`] defines one row; [`config`] what is collected; [`sampler`] draws and solves one
 //! sample; [`mod@collect`] runs the collection and [`mod@write`] its files; [`manifest`] is the folder's
-//! bookkeeping; [`read`] gives the rows back; [`content_sha256`] names them; [`split`] picks the cells that validate, [`Subset`] a part of
+//! bookkeeping, [`mod@merge`] puts together what several processes collected; [`read`] gives the rows back, [`summary`] tells of them; [`content_sha256`] names them; [`split`] picks the cells that validate, [`Subset`] a part of
 //! the whole.
 
 pub mod card;
@@ -22,19 +22,23 @@ pub mod collect;
 pub mod config;
 mod identity;
 pub mod manifest;
+pub mod merge;
 mod part;
 pub mod read;
 pub mod sampler;
 pub mod schema;
 pub mod split;
 mod subset;
+pub mod summary;
 pub mod write;
 
 pub use collect::{CollectError, CollectOptions, TypeReport, collect};
 pub use config::{CollectConfig, ConfigError};
 pub use identity::content_sha256;
+pub use merge::{merge, shards};
 pub use part::Part;
 pub use read::{Dataset, DatasetError};
 pub use schema::{Metadata, Sample, Status};
 pub use split::validation_cells;
 pub use subset::Subset;
+pub use summary::Summary;

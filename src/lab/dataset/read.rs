@@ -135,23 +135,8 @@ impl Dataset {
 
     /// Reads these parking types.
     pub fn read_types(folder: &Path, kinds: &[ParkingType]) -> Result<Dataset, DatasetError> {
-        let metadata = read_metadata(folder)?;
         let mut samples = Vec::new();
-        for &kind in kinds {
-            let manifest = read_manifest(folder, &metadata, kind)?;
-            let shards = manifest
-                .shards
-                .par_iter()
-                .enumerate()
-                .map(|(index, record)| {
-                    let path = folder.join(&record.file);
-                    let file = open_checked(&path, record)?;
-                    decode(file, &metadata, kind, index)
-                        .map_err(|message| DatasetError::Content { path, message })
-                })
-                .collect::<Result<Vec<Vec<Sample>>, _>>()?;
-            samples.extend(shards.into_iter().flatten());
-        }
+        let metadata = for_each_shard(folder, kinds, |_, shard| samples.extend(shard))?;
         Ok(Dataset { metadata, samples })
     }
 
@@ -184,6 +169,31 @@ impl Dataset {
     }
 }
 
+/// Hands over the rows of these types in order, shard by shard; as many shards are read at a time as there are
+/// threads.
+pub(super) fn for_each_shard(
+    folder: &Path,
+    kinds: &[ParkingType],
+    mut take: impl FnMut(&Metadata, Vec<Sample>),
+) -> Result<Metadata, DatasetError> {
+    let metadata = read_metadata(folder)?;
+    for &kind in kinds {
+        let manifest = read_manifest(folder, &metadata, kind)?;
+        let shards: Vec<(usize, &ShardRecord)> = manifest.shards.iter().enumerate().collect();
+        for some in shards.chunks(rayon::current_num_threads()) {
+            let read = some.par_iter().map(|&(index, record)| {
+                let path = folder.join(&record.file);
+                let file = open_checked(&path, record)?;
+                decode(file, &metadata, kind, index)
+                    .map_err(|message| DatasetError::Content { path, message })
+            });
+            let read: Vec<Vec<Sample>> = read.collect::<Result<_, _>>()?;
+            read.into_iter().for_each(|samples| take(&metadata, samples));
+        }
+    }
+    Ok(metadata)
+}
+
 /// Whether the folder has anything of a type.
 fn begun(folder: &Path, kind: ParkingType) -> bool {
     manifest_path(folder, kind).exists()
@@ -198,7 +208,7 @@ fn read_file(path: &Path) -> Result<Vec<u8>, DatasetError> {
 }
 
 /// A shard whose bytes are those on record.
-fn open_checked(path: &Path, record: &ShardRecord) -> Result<File, DatasetError> {
+pub(super) fn open_checked(path: &Path, record: &ShardRecord) -> Result<File, DatasetError> {
     let failed = |source| DatasetError::Io { path: path.to_owned(), source };
     let mut file = File::open(path).map_err(failed)?;
     let mut bytes = Vec::new();
@@ -264,8 +274,8 @@ pub(crate) fn read_manifest(
     Ok(manifest)
 }
 
-/// The rows of shard `index`, every one in its place.
-fn decode(
+/// The rows of shard `index`, every one in its place; or why the file is not that shard.
+pub(super) fn decode(
     file: File,
     metadata: &Metadata,
     kind: ParkingType,

@@ -7,7 +7,8 @@ use std::{fs, io};
 use serde::{Deserialize, Serialize};
 
 use crate::episode::{CHANGE_M, FLOOR_M, REJECTED, Row};
-use crate::files::{sha256_hex, write_whole};
+use crate::files::{reason, sha256_hex, write_whole};
+use crate::lab::shards::State;
 
 /// The record of a finished shard.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -269,7 +270,12 @@ struct Sealed {
 impl ShardRecord {
     /// The file of a shard.
     pub fn path(folder: &Path, shard: u64) -> PathBuf {
-        folder.join(format!("shard-{shard:06}.json"))
+        folder.join(Self::file_name(shard))
+    }
+
+    /// The same without folder.
+    pub fn file_name(shard: u64) -> String {
+        format!("shard-{shard:06}.json")
     }
 
     /// Writes the record; it appears whole or not at all.
@@ -281,9 +287,25 @@ impl ShardRecord {
 
     /// The record of a shard, where there is one that is whole and its own.
     pub fn read(folder: &Path, shard: u64) -> Option<Self> {
-        let bytes = fs::read(Self::path(folder, shard)).ok()?;
-        let Sealed { sha256, record } = serde_json::from_slice(&bytes).ok()?;
-        (record.shard == shard && record.sum() == sha256).then_some(record)
+        Self::read_or_why(folder, shard).ok()
+    }
+
+    /// The record of a shard, or what is there instead.
+    pub(super) fn read_or_why(folder: &Path, shard: u64) -> Result<Self, State> {
+        let damaged = |why: &str| State::Damaged(why.to_owned());
+        let bytes = fs::read(Self::path(folder, shard)).map_err(|e| match e.kind() {
+            io::ErrorKind::NotFound => State::Missing,
+            _ => State::Damaged(reason(&e)),
+        })?;
+        let Sealed { sha256, record } =
+            serde_json::from_slice(&bytes).map_err(|_| damaged("no record of a shard"))?;
+        if record.sum() != sha256 {
+            return Err(damaged("it has not the checksum that it names"));
+        }
+        if record.shard != shard {
+            return Err(State::Foreign(format!("it is the record of shard {}", record.shard)));
+        }
+        Ok(record)
     }
 
     fn sum(&self) -> String {

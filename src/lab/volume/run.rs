@@ -10,6 +10,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::draw::draw;
+use super::merge::check_settings;
 use super::record::{Failure, Outcome, Results, ShardRecord, Times};
 use super::{Totals, VolumeConfig};
 use crate::curves::reeds_shepp;
@@ -20,6 +21,7 @@ use crate::lab::dataset::Part;
 use crate::lab::dataset::schema::GIT_REVISION;
 use crate::lab::evaluation::oracle;
 use crate::lab::progress;
+use crate::lab::shards::Unfinished;
 use crate::n3p::{Method, MethodError, MethodSettings, Models, ModelsError};
 use crate::output::PathFile;
 use crate::planners::Planner;
@@ -66,6 +68,9 @@ pub enum VolumeError {
         /// What differs.
         what: &'static str,
     },
+    /// Shards to merge are not there, damaged or another's.
+    #[error(transparent)]
+    Unfinished(#[from] Unfinished),
     /// The models cannot be used.
     #[error(transparent)]
     Models(#[from] ModelsError),
@@ -77,11 +82,14 @@ pub enum VolumeError {
 impl VolumeError {
     /// Whether the caller's input is at fault.
     pub fn is_bad_input(&self) -> bool {
-        matches!(self, Self::Folder { .. } | Self::Other { .. } | Self::Models(_))
+        matches!(
+            self,
+            Self::Folder { .. } | Self::Other { .. } | Self::Unfinished(_) | Self::Models(_)
+        )
     }
 }
 
-fn failed(path: &Path) -> impl FnOnce(io::Error) -> VolumeError + '_ {
+pub(super) fn failed(path: &Path) -> impl FnOnce(io::Error) -> VolumeError + '_ {
     |error| VolumeError::Io { path: path.to_owned(), error }
 }
 
@@ -98,16 +106,8 @@ pub fn run(
             .map_err(|error| VolumeError::Folder { path: folder.to_owned(), error })?;
     }
     let settings = out.join("config.toml");
-    match std::fs::read_to_string(&settings) {
-        Ok(text) if text == config.to_toml() => {}
-        Ok(_) => {
-            let what = "holds the records of another configuration";
-            return Err(VolumeError::Other { path: out.to_owned(), what });
-        }
-        Err(e) if e.kind() == io::ErrorKind::NotFound => {
-            write_whole(&settings, config.to_toml().as_bytes()).map_err(failed(&settings))?;
-        }
-        Err(e) => return Err(failed(&settings)(e)),
+    if !check_settings(config, out)? {
+        write_whole(&settings, config.to_toml().as_bytes()).map_err(failed(&settings))?;
     }
     let job = Job { config, out, options, models: Models::usual(&[Method::N3P], None)? };
     job.all()?;
