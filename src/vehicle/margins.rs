@@ -41,8 +41,7 @@ impl Margins {
 
     /// Of the whole car with its mirrors: no part of it is kept farther off.
     pub fn of_everything(self) -> Self {
-        let most = self.mirrors.unwrap_or(0.0);
-        Self { mirrors: None, ..self }.at_least(most)
+        self.mirrors.map_or(self, |most| Self { mirrors: None, ..self }.at_least(most))
     }
 
     /// The same, nowhere less than `margin`.
