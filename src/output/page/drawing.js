@@ -2,8 +2,9 @@
 "use strict";
 
 const drawing = (() => {
+  const { namespaceURI } = document.querySelector("svg");
   const element = (name, attributes = {}, parent = null) => {
-    const made = document.createElementNS("http://www.w3.org/2000/svg", name);
+    const made = document.createElementNS(namespaceURI, name);
     for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
     parent?.append(made);
     return made;
