@@ -307,9 +307,9 @@ const PROBE: &str = r##"<script>
   found.zoomed = at("zoom").getAttribute("aria-pressed");
   at("copy").click();
   expect(address === `#play-${at("scene").value}-${document.querySelector("#runs input:checked").value}`, "the link to copy");
+  expect(document.documentElement.scrollWidth <= innerWidth, `${document.documentElement.scrollWidth} wide in a window of ${innerWidth}`);
   at("theme").click();
   at("show-paper").click();
-  expect(document.documentElement.scrollWidth <= innerWidth, "wider than the window");
   // A link shows its scene though the filter hides it.
   choose("filter-world", "lots");
   found.problems = problems.slice(0, 20).join("; ");

@@ -15,7 +15,7 @@ use crate::world::ParkingType;
 /// How to read the table.
 pub(super) const NOTE: &str = "\
 “Home” are the scenes generated as in the paper, of every level, “away” all others: on them nothing was trained or \
-chosen. “× faster” is the ratio of mean times to that of `ha-rs` in the scenes that both methods apply to, “cost / \
+chosen. “× faster” is the ratio of mean times to that of ha-rs in the scenes that both methods apply to, “cost / \
 best” the 95th percentile of the cost over that of the cheapest path of any method in the same scene.";
 
 /// What times are held against.
@@ -75,8 +75,9 @@ pub fn compare(rows: &[Row], kind: Option<Option<ParkingType>>) -> Vec<HomeAndAw
             p95_cost: (!costs.is_empty()).then(|| percentile(&costs, 0.95)),
         })
     };
-    let all: Vec<&Row> = sides.iter().flatten().flat_map(|(_, rows)| rows).copied().collect();
-    let methods = by_method(&all).into_iter().map(|(method, _)| method);
+    let is_used = |method: &&str| sides.iter().flatten().any(|(name, _)| name == method);
+    let all: Vec<&Row> = rows.iter().collect();
+    let methods = by_method(&all).into_iter().map(|(method, _)| method).filter(is_used);
     let line = |method: &str| HomeAndAway {
         method: method.to_owned(),
         home: side(0, method),

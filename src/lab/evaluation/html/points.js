@@ -89,7 +89,7 @@
     const ring = drawing.element("circle", { class: "ring", r: 7 });
     const plot = { svg, ring, points: null, last: null };
     const ready = () => { plot.points ??= pointsOf(svg); };
-    const title = svg.querySelector("title").textContent;
+    const title = svg.getAttribute("aria-label") ?? svg.querySelector("title").textContent;
     svg.setAttribute("tabindex", 0);
     svg.setAttribute("role", "application");
     svg.setAttribute("aria-label", `${title}. Arrows go from point to point, Enter shows the scene.`);

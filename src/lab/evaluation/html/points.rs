@@ -115,7 +115,7 @@ impl Axes {
 
     fn draw(&self, heading: &str, scenes: &[(usize, &SceneView)], gallery: &Gallery) -> String {
         let mut svg = format!(
-            "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\"><title>Time and cost of every scene, {}</title>\n",
+            "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"Time and cost of every scene, {}\">\n",
             escape(heading)
         );
         self.draw_axes(&mut svg);
