@@ -15,8 +15,9 @@ use crate::world::ParkingType;
 /// How to read the table.
 pub(super) const NOTE: &str = "\
 “Home” are the scenes generated as in the paper, of every level, “away” those of all other sets: nothing was trained \
-or chosen on them, unless they are of the set wide. “× faster” is the ratio of mean times to that of ha-rs in the scenes that both methods apply to, “cost / \
-best” the 95th percentile of the cost over that of the cheapest path of any method in the same scene.";
+or chosen on them, unless they are of the set wide. “× faster” is the ratio of mean times to that of ha-rs in the \
+scenes that both methods apply to, “cost / best” the 95th percentile of the cost over that of the cheapest path of \
+any method in the same scene.";
 
 /// What times are held against.
 pub const REFERENCE: Method = Method::HA_RS;

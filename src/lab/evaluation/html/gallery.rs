@@ -65,7 +65,7 @@ pub struct Gallery {
 pub struct SceneView {
     /// Its name.
     pub name: String,
-    /// Its world, as [`filter`](super::filter) has it.
+    /// Its world: the name of its set, or `files`.
     pub world: String,
     /// Its parking type, or `–`.
     #[serde(rename = "type")]
@@ -258,11 +258,8 @@ fn thinned(poses: &[[f64; 3]]) -> Vec<[f64; 3]> {
     let mut kept: Vec<usize> = Vec::new();
     for to in 0..moving.len() {
         let from = kept.last().copied().unwrap_or(0);
-        if to == 0 {
-            kept.push(0);
-        } else if to + 1 == moving.len() {
-            kept.push(to);
-        } else if !(from + 1..=to).all(|i| is_between(from, to + 1, i)) {
+        let is_end = to == 0 || to + 1 == moving.len();
+        if is_end || !(from + 1..=to).all(|i| is_between(from, to + 1, i)) {
             kept.push(to);
         }
     }
