@@ -8,11 +8,14 @@ import sys
 from pathlib import Path
 
 PAGE = Path(__file__).parent / "page"
+# Scripts that the report of evaluations has, too.
+SHARED = Path(__file__).parent.parent / "src" / "output" / "page"
 
 
 def inside(name: str) -> str:
     """A file of the page that stands well within an element."""
-    text = (PAGE / name).read_text(encoding="utf-8")
+    folder = PAGE if (PAGE / name).exists() else SHARED
+    text = (folder / name).read_text(encoding="utf-8")
     assert "</script" not in text and "</style" not in text, name
     return f"\n{text}"
 

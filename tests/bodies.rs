@@ -184,6 +184,7 @@ fn mirrors_pass_where_the_sides_are_to_keep_more() {
         start: Pose::new(-8.0, 0.0, 0.0),
         goal: Pose::new(12.0, 0.0, 0.0),
         obstacles: vec![gate(1.05), gate(-1.05)],
+        bounds: Some([-14.0, -6.0, 18.0, 6.0]),
         contour: CONTOUR.to_vec(),
         margins: Some(Margins { left: 0.1, right: 0.1, ..Margins::default() }),
         ..Scene::default()

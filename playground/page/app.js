@@ -254,6 +254,7 @@ async function savePath() {
 function listen() {
   const on = (id, event, does) => $(id).addEventListener(event, does);
   on("add-car", "click", edit.addCar);
+  on("add-bounds", "click", edit.nextBound);
   on("add-wall", "click", () => edit.draw(!edit.drawing));
   on("turn-left", "click", () => edit.turn(Math.PI / 36));
   on("turn-right", "click", () => edit.turn(-Math.PI / 36));
@@ -314,6 +315,8 @@ function keys(event) {
     (key === "s" ? $("start") : $("goals").firstChild).focus({ preventScroll: true });
   } else if (key === "c") {
     edit.addCar();
+  } else if (key === "b") {
+    edit.nextBound();
   } else if (key === "w") {
     edit.draw(true);
   } else if (key === "+" || key === "=") {

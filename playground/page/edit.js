@@ -12,6 +12,7 @@ const edit = (() => {
   let doing = null;
 
   function commit(scene) {
+    if (scene === lot.scene) return;
     lot.replace(scene);
     picture.drawScene();
     changed(true);
@@ -20,12 +21,13 @@ const edit = (() => {
   function select(thing, focus = false) {
     picture.select(thing);
     document.getElementById("remove").disabled = !canRemove();
-    for (const id of ["turn-left", "turn-right"]) document.getElementById(id).disabled = !thing;
+    const turns = thing && thing.what !== "bound";
+    for (const id of ["turn-left", "turn-right"]) document.getElementById(id).disabled = !turns;
     if (thing && focus) nodeOf(thing)?.focus({ preventScroll: true });
   }
 
   const nodeOf = (thing) => svg.querySelector(
-    thing.what === "start" ? "#start" : thing.what === "goal" ? `#goals > :nth-child(${thing.index + 1})` : `#obstacles > :nth-child(${thing.index + 1})`);
+    thing.what === "start" ? "#start" : `#${thing.what}s > :nth-child(${thing.index + 1})`);
 
   function thingOf(node) {
     const { what, index } = node.dataset;
@@ -34,7 +36,7 @@ const edit = (() => {
 
   const canRemove = () => {
     const thing = picture.selected;
-    return thing?.what === "obstacle" || (thing?.what === "goal" && lot.scene.goals?.length > 1);
+    return thing?.what === "obstacle" || thing?.what === "bound" || (thing?.what === "goal" && lot.scene.goals?.length > 1);
   };
 
   function remove() {
@@ -61,6 +63,14 @@ const edit = (() => {
     picture.drawScene();
     changed(true);
     nodeOf(picture.selected).focus({ preventScroll: true });
+  }
+
+  /** Selects the next side of the bounds; where there are none they are added first. */
+  function nextBound() {
+    const { selected } = picture;
+    const index = selected?.what === "bound" ? (selected.index + 1) % 4 : 0;
+    if (!lot.scene.bounds) commit(withBounds(lot.scene));
+    select({ what: "bound", index }, true);
   }
 
   function turn(angle) {
@@ -95,6 +105,10 @@ const edit = (() => {
 
   function beginCorner(thing, corner) {
     const before = lot.scene;
+    // Of the bounds two sides meet there.
+    if (thing.what === "bound") {
+      return (to) => withBound(withBound(before, thing.index, to[thing.index % 2]), corner, to[corner % 2]);
+    }
     return (to) => withObstacle(before, thing.index, before.obstacles[thing.index].with(corner, to));
   }
 
@@ -218,7 +232,7 @@ const edit = (() => {
   });
 
   return {
-    addCar, draw, remove, turn, select,
+    addCar, nextBound, draw, remove, turn, select,
     get drawing() { return drawing; },
     get dragging() { return doing?.begun === true; },
     undo: () => { if (lot.undo()) { select(null); changed(true); } },

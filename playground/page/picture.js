@@ -4,18 +4,7 @@
 const picture = (() => {
   const svg = document.getElementById("picture");
   const layer = (id) => document.getElementById(id);
-  const element = (name, attributes = {}, parent = null) => {
-    const made = document.createElementNS("http://www.w3.org/2000/svg", name);
-    for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-    parent?.append(made);
-    return made;
-  };
-  /** Sets what is not so already: the browser draws anew whatever is set. */
-  const set = (node, attributes) => {
-    for (const [key, value] of Object.entries(attributes)) {
-      if (node.getAttribute(key) !== String(value)) node.setAttribute(key, value);
-    }
-  };
+  const { element, set, text, line, transform, surroundings, drawCar } = drawing;
   /** What is known of an obstacle, found out once: its corners never change. */
   const known = new WeakMap();
   const about = (points) => {
@@ -25,11 +14,6 @@ const picture = (() => {
     }
     return known.get(points);
   };
-  /** Chains of points as one path, each closed or not. */
-  const chains = (lists, end = "") => lists.map((list) => `M${list.map(([x, y]) => `${x} ${y}`).join("L")}${end}`).join("");
-  const text = (points) => points.map(([x, y]) => `${+x.toFixed(4)},${+y.toFixed(4)}`).join(" ");
-  const line = (poses) => `M${poses.map(([x, y]) => `${+x.toFixed(3)} ${+y.toFixed(3)}`).join("L")}`;
-  const transform = ([x, y, turn]) => `translate(${x} ${y}) rotate(${turn * 180 / Math.PI})`;
 
   const view = { x: 0, y: 0, scale: 30 };
   let selected = null;
@@ -91,28 +75,6 @@ const picture = (() => {
     look();
   }
 
-  /** A car in its own frame: body, windscreen, wheels that can be steered, its name. */
-  function drawCar(parent, vehicle, kind, name) {
-    const { length, width, wheelbase, rear_overhang: back } = vehicle;
-    parent.replaceChildren();
-    parent.setAttribute("class", `car ${kind}`);
-    const wheel = { width: length * 0.13, height: width * 0.14, class: "wheel" };
-    for (const side of [-1, 1]) {
-      for (const [axle, steered] of [[0, false], [wheelbase, true]]) {
-        const at = element("g", { transform: `translate(${axle} ${side * width * 0.45})` }, parent);
-        const turning = element("g", steered ? { class: "steered" } : {}, at);
-        element("rect", { ...wheel, x: -wheel.width / 2, y: -wheel.height / 2 }, turning);
-      }
-    }
-    element("rect", { class: "body", x: -back, y: -width / 2, width: length, height: width, rx: width * 0.16 }, parent);
-    const [a, b] = [length * 0.62 - back, length * 0.74 - back];
-    element("polygon", { class: "glass", points: text([[a, -width * 0.36], [b, -width * 0.42], [b, width * 0.42], [a, width * 0.36]]) }, parent);
-    if (name) {
-      const label = element("text", { class: "name", "font-size": Math.min(width * 0.36, length * 0.16) }, parent);
-      label.textContent = name;
-    }
-  }
-
   function drawVehicle(group, vehicle, pose, kind, name) {
     const key = JSON.stringify([vehicle, kind, name]);
     if (group.dataset.key !== key) {
@@ -149,7 +111,8 @@ const picture = (() => {
     node.classList.toggle("wrong", wrong !== null && wrong.some((other) => same(thing, other)));
   }
 
-  let drawnPoints;
+  /** What stands around that is drawn already: a scan has very many points. */
+  let drawnAround = [null];
   /** What can be reached by Tab: the nearest to the goal. */
   const REACHABLE = 16;
 
@@ -171,22 +134,32 @@ const picture = (() => {
       const name = { parked: "Parked car", wall: "Wall", block: "Obstacle" }[kind];
       mark(node, { what: "obstacle", index }, `${name} at ${metres(centre[0])}, ${metres(centre[1])}`, near.has(index));
     });
-    if (scene.points !== drawnPoints) {
-      drawnPoints = scene.points;
-      layer("points").setAttribute("d", (scene.points ?? []).map(([x, y]) => `M${x} ${y}h0`).join(""));
+    const around = [scene.points, scene.polylines, scene.low, scene.drivable_area];
+    if (around.some((part, i) => part !== drawnAround[i])) {
+      drawnAround = around;
+      for (const [id, d] of Object.entries(surroundings(scene))) set(layer(id), { d });
     }
-    const { obstacles: solids = [], polylines = [], points = [] } = scene.low ?? {};
-    const area = scene.drivable_area;
-    layer("walls").setAttribute("d", chains(scene.polylines ?? []));
-    layer("low").setAttribute("d", chains(solids, "Z") + chains(polylines) + points.map(([x, y]) => `M${x} ${y}h0`).join(""));
-    layer("area").setAttribute("d", area ? chains([area.outer, ...(area.holes ?? [])], "Z") : "");
-    const bounds = layer("bounds");
-    bounds.toggleAttribute("hidden", !scene.bounds);
-    if (scene.bounds) {
-      const [x, y, right, top] = scene.bounds;
-      set(bounds, { x, y, width: right - x, height: top - y });
-    }
+    drawBounds(scene);
     drawHandles();
+  }
+
+  /** Each side of the bounds is a thing of its own. Tab reaches one of them, the key B the others. */
+  function drawBounds(scene) {
+    const sides = scene.bounds ? SIDES : [];
+    matchChildren(layer("bounds"), sides.length, "g").forEach((node, index) => {
+      if (!node.children.length) for (const kind of ["reach", "edge"]) element("path", { class: kind }, node);
+      set(node, { class: `thing bound ${index % 2 ? "flat" : "upright"}` });
+      const d = line(endsOf(scene.bounds, index));
+      for (const path of node.children) set(path, { d });
+      const isFirst = index === 0 && selected?.what !== "bound";
+      mark(node, { what: "bound", index }, `${SIDES[index]} bound at ${metres(scene.bounds[index])}`, isFirst);
+    });
+  }
+
+  /** The ends of a side of the bounds, where it meets the next side and the one before. */
+  function endsOf(bounds, index) {
+    const at = (other) => (index % 2 ? [bounds[other], bounds[index]] : [bounds[index], bounds[other]]);
+    return [at((index + 1) % 4), at((index + 3) % 4)];
   }
 
   /** A path, part by part of one gear. */
@@ -247,6 +220,11 @@ const picture = (() => {
       element("circle", { class: "reach", cx: point[0], cy: point[1], r: 20 * pixel }, node);
       element("circle", { class: "knob", cx: point[0], cy: point[1], r: 7 * pixel }, node);
     };
+    if (selected.what === "bound") {
+      const { index } = selected;
+      endsOf(scene.bounds, index).forEach((point, i) => handle(point, "corner", (index + (i ? 3 : 1)) % 4));
+      return;
+    }
     const { centre, tip } = turningHandle(scene, selected, 26 * pixel);
     element("path", { class: "stem", d: line([centre, tip]) }, group);
     handle(tip, "turn");

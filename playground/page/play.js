@@ -40,9 +40,7 @@ const play = (() => {
     picture.svg.classList.add("playing");
     const standing = Math.abs(speed) < 0.01;
     picture.drawVehicle(car, vehicle, pose, `moving ${gear > 0 ? "forward" : "backward"}`, "");
-    for (const node of car.querySelectorAll(".steered")) {
-      node.setAttribute("transform", `rotate(${steer * 180 / Math.PI})`);
-    }
+    drawing.steer(car, steer);
     // Toward the left is counter-clockwise for whoever sits behind it.
     wheel.style.rotate = `${-steer * GEARING}rad`;
     const ended = time >= motion.duration_s - 1e-6;

@@ -46,7 +46,8 @@ const PARTING: Duration = Duration::from_secs(30);
 const PAGE: &[(&str, &str, &str)] = &[
     ("/", "text/html; charset=utf-8", include_str!("../page/index.html")),
     ("/style.css", "text/css; charset=utf-8", include_str!("../page/style.css")),
-    ("/geometry.js", SCRIPT, include_str!("../page/geometry.js")),
+    ("/geometry.js", SCRIPT, include_str!("../../src/output/page/geometry.js")),
+    ("/drawing.js", SCRIPT, include_str!("../../src/output/page/drawing.js")),
     ("/planner.js", SCRIPT, include_str!("../page/planner.js")),
     ("/scene.js", SCRIPT, include_str!("../page/scene.js")),
     ("/picture.js", SCRIPT, include_str!("../page/picture.js")),

@@ -135,6 +135,64 @@ class Tries:
         assert len(self.scene()["obstacles"]) == count + 2
         self.settle()
 
+    def changes_the_bounds(self):
+        """By pointer, by key, undone, saved and in a link; what they leave out is told."""
+        self.fresh()
+        before = self.scene()["bounds"]
+        middle = lambda side: self.where(f"((b) => [[b[0], (b[1] + b[3]) / 2], [(b[0] + b[2]) / 2, b[3]]][{side}])(lot.scene.bounds)")
+        x, y = middle(1)
+        self.browser.drag([(x, y), (x + 4, y - 5), (x + 9, y - 30)])
+        after = self.scene()["bounds"]
+        assert after[:3] == before[:3] and after[3] > before[3] + 0.5, (before, after)
+        assert self.browser.run("lot.past.length") == 1, "a drag is one step"
+        # Where two sides meet, both.
+        self.browser.run("picture.view.scale = 14, picture.view.x = lot.scene.bounds[2] - 5, picture.look()")
+        corner = self.where("[lot.scene.bounds[2], lot.scene.bounds[3]]")
+        self.browser.drag([corner, (corner[0] - 5, corner[1] + 3), (corner[0] - 14, corner[1] + 7)])
+        both = self.scene()["bounds"]
+        assert both[:2] == after[:2] and abs(both[2] - after[2] + 1) < 0.2 and abs(both[3] - after[3] + 0.5) < 0.2, (after, both)
+        self.settle()
+        self.picture("bounds")
+        # Keys: B goes from side to side, arrows move the one that is selected, and no other.
+        self.browser.run("edit.select(null), document.getElementById('fit').focus()")
+        self.browser.key("b", 66)
+        assert self.browser.run("document.activeElement.getAttribute('aria-label')").startswith("Left bound at")
+        self.browser.key("ArrowLeft", 37, modifiers=8)
+        self.browser.key("ArrowUp", 38)
+        moved = self.scene()["bounds"]
+        assert abs(moved[0] - both[0] + 1) < 1e-9 and moved[1:] == both[1:], (both, moved)
+        assert self.browser.run("document.getElementById('turn-left').disabled")
+        self.browser.key("b", 66)
+        assert self.browser.run("picture.selected.index") == 1
+        # No side passes the other.
+        for _ in range(40):
+            self.browser.key("ArrowUp", 38, modifiers=8)
+        _, low, _, high = self.scene()["bounds"]
+        assert abs(high - low - 2) < 1e-9, (low, high)
+        self.settle()
+        assert "bounds" in self.text("message"), self.text("message")
+        self.picture("outside")
+        while self.scene()["bounds"] != moved:
+            self.browser.key("z", 90, modifiers=2)
+        self.settle()
+        self.no_message()
+        # In a file and in a link.
+        self.browser.run("document.getElementById('save').click()")
+        assert self.downloaded(f"{self.scene()['name']}.json")["bounds"] == moved
+        self.browser.run("document.getElementById('link').click()")
+        self.browser.wait("location.hash.startsWith('#lot=')")
+        self.fresh(self.browser.run("location.href"))
+        assert self.scene()["bounds"] == moved
+        # Deleted, and added again around all there is.
+        self.browser.run("document.getElementById('add-bounds').click()")
+        self.browser.key("Delete", 46)
+        assert self.scene()["bounds"] is None and not self.browser.run("document.querySelectorAll('#bounds .thing').length")
+        self.browser.run("document.getElementById('add-bounds').click()")
+        self.settle()
+        left, low, right, high = self.scene()["bounds"]
+        assert all(left < x < right and low < y < high for o in self.scene()["obstacles"] for x, y in o)
+        self.no_message()
+
     def switches(self):
         self.fresh()
         first = self.text("length-a")
@@ -328,7 +386,7 @@ class Tries:
         self.picture("dark-compare")
         self.browser.dark(False)
 
-    ALL = [shows_a_plan, follows_a_drag, moves_cars_and_turns_them, switches, plays, every_example, loads_and_saves, links,
+    ALL = [shows_a_plan, follows_a_drag, moves_cars_and_turns_them, changes_the_bounds, switches, plays, every_example, loads_and_saves, links,
            keys, errors, explains, on_a_phone, in_the_dark]
 
 

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::drives;
 use super::html;
 use super::learning_curve::CurvePoint;
-use super::report::{self, Provenance};
+use super::report::{self, Provenance, Results};
 use super::rows::{self, RowWriter, RowsError};
 use super::trace::{self, Trace};
 use crate::episode::{self, Case, Episode, Row};
@@ -258,18 +258,16 @@ impl Outputs {
             let path = dir.join(name);
             write_whole(&path, text.as_bytes()).map_err(|error| OutputError::File { path, error })
         };
-        let mut markdown = report::markdown(title, rows, curve, provenance);
         if !self.drives.is_empty() {
-            let table = drives::table(&self.drives).markdown();
-            markdown += &format!("\n{table}\n{}\n", drives::NOTE);
             write("drives.csv", drives::csv(&self.drives))?;
         }
-        write("report.md", markdown)?;
+        let results = Results { title, rows, drives: &self.drives, curve, provenance };
+        write("report.md", report::markdown(&results))?;
         let shown = html::gallery::chosen(cases, rows);
         let scenes = shown.iter().map(|c| c.scene.name.as_str()).collect();
         let path = dir.join(TRACES);
         let traces =
             trace::read(&path, &scenes).map_err(|error| OutputError::File { path, error })?;
-        write("report.html", html::page(title, rows, curve, provenance, &shown, &traces))
+        write("report.html", html::page(&results, &shown, &traces))
     }
 }

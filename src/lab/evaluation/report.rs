@@ -5,13 +5,16 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::Serialize;
 
+use super::away;
 use super::clearance;
+use super::drives;
 use super::learning_curve::{self, CurvePoint};
 use super::metrics;
 use super::quality;
 use super::table;
 use crate::episode::Row;
 use crate::lab::dataset::schema::GIT_REVISION;
+use crate::lab::driving::DriveRow;
 use crate::planners::{Budget, Effort};
 
 /// Where and how a run was made.
@@ -108,13 +111,24 @@ pub fn text(rows: &[Row], seed: u64) -> String {
     out
 }
 
-/// The whole `report.md`; `curve` may be empty.
-pub fn markdown(
-    title: &str,
-    rows: &[Row],
-    curve: &[CurvePoint],
-    provenance: &Provenance,
-) -> String {
+/// What a report is about.
+#[derive(Clone, Copy, Debug)]
+pub struct Results<'a> {
+    /// Its heading.
+    pub title: &'a str,
+    /// All rows of the run.
+    pub rows: &'a [Row],
+    /// What became of the paths that were driven; may be empty.
+    pub drives: &'a [DriveRow],
+    /// What more data gives; may be empty.
+    pub curve: &'a [CurvePoint],
+    /// Where the numbers come from.
+    pub provenance: &'a Provenance,
+}
+
+/// The whole `report.md`.
+pub fn markdown(results: &Results) -> String {
+    let &Results { title, rows, drives, curve, provenance } = results;
     let groups = metrics::summarise(rows, provenance.seed);
     let mut out = format!("# {title}\n\n- Command: `{}`\n", provenance.command);
     for (name, value) in provenance.facts() {
@@ -122,6 +136,11 @@ pub fn markdown(
     }
     out += "\n";
     out += &headline(rows);
+    let compared = away::compare(rows, None);
+    if !compared.is_empty() {
+        let told = away::sentence(&compared).map_or(String::new(), |told| told + "\n\n");
+        let _ = write!(out, "\n{}\n{told}{}\n", away::table(&compared).markdown(), away::NOTE);
+    }
     for table in table::comparison(&groups) {
         let _ = write!(out, "\n{}", table.markdown());
     }
@@ -141,6 +160,9 @@ pub fn markdown(
     }
     if !curve.is_empty() {
         let _ = write!(out, "\n{}\n{CURVE_NOTE}", learning_curve::table(curve).markdown());
+    }
+    if !drives.is_empty() {
+        let _ = write!(out, "\n{}\n{}\n", drives::table(drives).markdown(), drives::NOTE);
     }
     out
 }
@@ -227,7 +249,13 @@ mod tests {
     fn the_report_names_machine_seed_and_every_failure() {
         let rows = [row("a", "ha-rs", 0.5, true), row("b", "ha-rs", 0.4, false)];
         let provenance = Provenance::here("2 made by hand".into(), 7, Budget::new(100), 1);
-        let report = markdown("Test", &rows, &[], &provenance);
+        let report = markdown(&Results {
+            title: "Test",
+            rows: &rows,
+            drives: &[],
+            curve: &[],
+            provenance: &provenance,
+        });
         for part in ["Machine: ", "intervals: 7", "1 of 2 solved", "| b | ha-rs | budget spent |"] {
             assert!(report.contains(part), "{part} not in\n{report}");
         }

@@ -2,10 +2,9 @@
 
 use std::fmt::Write;
 
-use serde::Serialize;
-
 use super::super::learning_curve::CurvePoint;
-use super::plots::num;
+use super::filter::Setting;
+use super::plots::{PanelView, num};
 use super::{escape, family};
 
 /// Sizes, in the panel's own units (about a pixel).
@@ -16,15 +15,8 @@ const RIGHT: f64 = 66.0;
 const TOP: f64 = 12.0;
 const BOTTOM: f64 = 44.0;
 
-/// A drawn panel.
-#[derive(Serialize)]
-pub struct CurveView {
-    pub heading: String,
-    pub svg: String,
-}
-
 /// The panels, in the order in which the types first occur.
-pub fn panels(points: &[CurvePoint]) -> Vec<CurveView> {
+pub fn panels(points: &[CurvePoint]) -> Vec<PanelView> {
     let mut kinds = Vec::new();
     for p in points {
         if !kinds.contains(&p.kind) {
@@ -33,7 +25,9 @@ pub fn panels(points: &[CurvePoint]) -> Vec<CurveView> {
     }
     let panel = |kind| {
         let mine: Vec<&CurvePoint> = points.iter().filter(|p| p.kind == kind).collect();
-        CurveView { heading: kind.to_string(), svg: draw(&kind.to_string(), &mine) }
+        let heading = kind.to_string();
+        let attributes = Setting::of_kind(heading.clone()).attributes();
+        PanelView { svg: draw(&heading, &mine), heading, attributes }
     };
     kinds.into_iter().map(panel).collect()
 }

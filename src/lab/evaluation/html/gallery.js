@@ -1,16 +1,21 @@
 // The gallery: scenes, and the paths in them, driven motion by motion.
 //
-// Data: see gallery.rs. World coordinates are metres, y up; the map's are metres from the
-// view's upper left corner, y down.
+// Data: see gallery.rs. All is drawn in the scene's own frame, metres, y up. geometry.js and drawing.js are the
+// playground's, too.
 "use strict";
-{
+
+const gallery = (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
+  // What is usual is left out of the data.
+  const USUAL = { ok: true, applies: true, why: "", nodes: 0, length: null, changes: null, over: null, clearance: null, route: "", start: null, segments: [] };
+  for (const s of data.scenes) s.runs = s.runs.map((run) => ({ ...USUAL, ...run }));
   const at = (id) => document.getElementById(id);
   const map = at("map");
+  const { element } = drawing;
   const FOOTPRINT_STEP = 0.8;
   const ZOOM = 15;
 
-  // ---- Geometry -----------------------------------------------------------------------
+  // ---- Motions ------------------------------------------------------------------------
 
   /** The pose after the signed length s of a motion: Segment::at of the planner. */
   function drive([x, y, heading], curvature, s) {
@@ -54,43 +59,24 @@
     return { poses, far };
   }
 
-  /** Where the driven car was after a share of its way. */
+  /** Where the driven car was after a share of its way: between two poses, of which only few are kept. */
   function drivenAt({ poses, far }, share) {
-    return (poses.find((p) => p.far >= share * far) ?? poses.at(-1)).pose;
-  }
-
-  const corner = ([x, y, heading], forward, left) => [
-    x + forward * Math.cos(heading) - left * Math.sin(heading),
-    y + forward * Math.sin(heading) + left * Math.cos(heading),
-  ];
-
-  function footprint(pose, v) {
-    const [back, front, side] = [-v.rear_overhang, v.length - v.rear_overhang, v.width / 2];
-    return [[back, -side], [front, -side], [front, side], [back, side]]
-      .map(([f, l]) => corner(pose, f, l));
+    const next = Math.max(1, poses.findIndex((p) => p.far >= share * far));
+    const [a, b] = [poses[next - 1], poses[next] ?? poses[next - 1]];
+    const part = b.far > a.far ? Math.min(1, (share * far - a.far) / (b.far - a.far)) : 1;
+    return [lerp(a.pose[0], b.pose[0], part), lerp(a.pose[1], b.pose[1], part), lerpAngle(a.pose[2], b.pose[2], part)];
   }
 
   // ---- Drawing ------------------------------------------------------------------------
 
-  function element(name, attributes, parent) {
-    const e = document.createElementNS(map.namespaceURI, name);
-    for (const [key, value] of Object.entries(attributes)) e.setAttribute(key, value);
-    parent?.append(e);
-    return e;
-  }
-
-  /** Map coordinates of a world point, to a tenth of a millimetre. */
-  const local = (scene, [x, y]) => [x - scene.view[0], scene.view[3] - y].map((v) => +v.toFixed(4));
-  const points = (scene, list) => list.map((p) => local(scene, p).join()).join(" ");
-
   /** The path data of one motion: an exact arc, in halves so that none exceeds a half turn. */
-  function arc(scene, leg) {
+  function arc(leg) {
     const halves = [0.5, 1].map((share) => drive(leg.pose, leg.curvature, leg.length * share));
-    if (leg.curvature === 0) return `L${local(scene, halves[1])}`;
-    const r = Math.abs(1 / leg.curvature);
-    // Turning left on the map, whose y runs down, is against SVG's positive direction.
-    const sweep = leg.curvature * leg.length > 0 ? 0 : 1;
-    return halves.map((p) => `A${r} ${r} 0 0 ${sweep} ${local(scene, p)}`).join("");
+    const to = ([x, y]) => `${+x.toFixed(4)} ${+y.toFixed(4)}`;
+    if (leg.curvature === 0) return `L${to(halves[1])}`;
+    const r = +Math.abs(1 / leg.curvature).toFixed(6);
+    const sweep = leg.curvature * leg.length > 0 ? 1 : 0;
+    return halves.map((p) => `A${r} ${r} 0 0 ${sweep} ${to(p)}`).join("");
   }
 
   const gearOf = (leg) => (leg.length < 0 ? "backward" : "forward");
@@ -105,63 +91,37 @@
     return runs;
   }
 
-  function drawWay(scene, way, layer, plain) {
+  function drawWay(way, layer, plain) {
     for (const run of strokes(way)) {
-      const d = `M${local(scene, run[0].pose)}` + run.map((leg) => arc(scene, leg)).join("");
+      const d = drawing.line([run[0].pose]) + run.map(arc).join("");
       element("path", { d, class: plain ? "other-way" : `way ${gearOf(run[0])}` }, layer);
     }
   }
 
-  function drawChanges(scene, way, layer) {
+  function drawChanges(way, layer) {
     for (const run of strokes(way).slice(1)) {
-      const [cx, cy] = local(scene, run[0].pose);
+      const [cx, cy] = run[0].pose;
       element("circle", { cx, cy, r: 0.16, class: "change" }, layer);
     }
   }
 
-  function drawFootprints(scene, way, vehicle, layer) {
+  function drawFootprints(way, vehicle, layer) {
     for (const leg of way.all) {
       const first = Math.ceil(leg.driven / FOOTPRINT_STEP) * FOOTPRINT_STEP - leg.driven;
       for (let s = first; s < Math.abs(leg.length); s += FOOTPRINT_STEP) {
         const pose = drive(leg.pose, leg.curvature, Math.sign(leg.length) * s);
-        const shape = points(scene, footprint(pose, vehicle));
+        const shape = drawing.text(footprint(vehicle, pose));
         element("polygon", { points: shape, class: `ghost ${gearOf(leg)}` }, layer);
       }
     }
   }
 
   /** An outline with an arrow along the heading. */
-  function drawPose(scene, pose, vehicle, kind, layer) {
-    element("polygon", { points: points(scene, footprint(pose, vehicle)), class: kind }, layer);
+  function drawPose(pose, vehicle, kind, layer) {
+    element("polygon", { points: drawing.text(footprint(vehicle, pose)), class: kind }, layer);
     const tip = vehicle.length - vehicle.rear_overhang - 0.4;
-    const arrow = [corner(pose, tip - 0.7, 0.4), corner(pose, tip, 0), corner(pose, tip - 0.7, -0.4)];
-    element("polyline", { points: points(scene, arrow), class: `${kind} arrow` }, layer);
-  }
-
-  /** The car in its own frame (rear axle at the origin, front to the right). */
-  function drawCar(vehicle, layer) {
-    const v = vehicle;
-    const [back, front, side] = [-v.rear_overhang, v.length - v.rear_overhang, v.width / 2];
-    const car = element("g", { class: "car" }, layer);
-    const box = (x, y, width, height, rx, kind, parent = car) =>
-      element("rect", { x, y, width, height, rx, class: kind }, parent);
-    box(back, -side, v.length, v.width, 0.12, "body");
-    const cabin = v.wheelbase * 0.62;
-    element("path", { class: "glass", d: `M${cabin} ${-side * 0.8}L${cabin + 0.55} ${-side * 0.9}V${side * 0.9}L${cabin} ${side * 0.8}z` }, car);
-    element("path", { class: "glass", d: `M${back + 0.95} ${-side * 0.78}L${back + 0.5} ${-side * 0.86}V${side * 0.86}L${back + 0.95} ${side * 0.78}z` }, car);
-    for (const end of [-1, 1]) {
-      box(back, end * side * 0.72 - 0.17, 0.16, 0.34, 0.05, "lamp tail");
-      box(front - 0.16, end * side * 0.72 - 0.17, 0.16, 0.34, 0.05, "lamp head");
-    }
-    const wheel = [-0.32, -0.11, 0.64, 0.22, 0.06, "wheel"];
-    car.front = [];
-    for (const end of [-1, 1]) {
-      box(...wheel, element("g", { transform: `translate(0 ${end * side * 0.8})` }, car));
-      const holder = element("g", { transform: `translate(${v.wheelbase} ${end * side * 0.8})` }, car);
-      car.front.push(element("g", {}, holder));
-      box(...wheel, car.front.at(-1));
-    }
-    return car;
+    const arrow = [[tip - 0.7, 0.4], [tip, 0], [tip - 0.7, -0.4]].map((p) => outOf(pose, p));
+    element("polyline", { points: drawing.text(arrow), class: `${kind} arrow` }, layer);
   }
 
   // ---- State --------------------------------------------------------------------------
@@ -178,45 +138,47 @@
     const s = scene();
     const vehicle = data.vehicles[s.vehicle];
     const run = s.runs.find((r) => r.method === state.method) ?? s.runs[0];
-    map.replaceChildren(at("map-title"), at("map-text"));
-    const layer = (name, ...kinds) => element("g", { "data-layer": name, class: kinds.join(" ") }, map);
+    // The map's own y runs down from the view's upper left corner.
+    const [left, , , top] = s.view;
+    const world = at("world");
+    world.setAttribute("transform", `scale(1 -1) translate(${-left} ${-top})`);
+    world.replaceChildren();
+    const layer = (name) => element("g", { "data-layer": name }, world);
     const ground = layer("ground");
     if (s.bounds) {
-      const [x0, y0, x1, y1] = s.bounds;
-      element("polygon", { points: points(s, [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]), class: "bounds" }, ground);
+      const [x, y, right, upper] = s.bounds;
+      element("rect", { x, y, width: right - x, height: upper - y, class: "bounds" }, ground);
     }
     const regions = layer("regions");
-    run?.regions?.forEach((r, i) => element("polygon", { points: points(s, r), class: i ? "spot" : "lane" }, regions));
+    run?.regions?.forEach((r, i) => element("polygon", { points: drawing.text(r), class: i ? "spot" : "lane" }, regions));
     const obstacles = layer("obstacles");
-    for (const o of s.obstacles) element("polygon", { points: points(s, o), class: "obstacle" }, obstacles);
-    for (const o of s.lines) element("polyline", { points: points(s, o), class: "wall" }, obstacles);
-    for (const o of s.borders) element("polygon", { points: points(s, o), class: "wall" }, obstacles);
-    for (const p of s.points) {
-      const [cx, cy] = local(s, p);
-      element("circle", { cx, cy, r: 0.06, class: "point" }, obstacles);
+    for (const o of s.obstacles ?? []) element("polygon", { points: drawing.text(o), class: "obstacle" }, obstacles);
+    for (const [kind, d] of Object.entries(drawing.surroundings(s))) {
+      if (d) element("path", { d, class: kind }, obstacles);
     }
     const others = layer("others");
     for (const other of s.runs) {
-      if (other !== run && other.start) drawWay(s, legs(other, vehicle), others, true);
+      if (other !== run && other.start) drawWay(legs(other, vehicle), others, true);
     }
     const footprints = layer("footprints");
-    drawPose(s, s.goal, vehicle, "goal", layer("goal"));
+    drawPose(s.goal, vehicle, "goal", layer("goal"));
     const preparatory = layer("preparatory");
-    if (run?.preparatory) drawPose(s, run.preparatory, vehicle, "preparatory", preparatory);
+    if (run?.preparatory) drawPose(run.preparatory, vehicle, "preparatory", preparatory);
     const path = layer("path");
     const way = run?.start ? legs(run, vehicle) : null;
     if (way) {
-      drawFootprints(s, way, vehicle, footprints);
-      drawWay(s, way, path, false);
+      drawFootprints(way, vehicle, footprints);
+      drawWay(way, path, false);
     }
     const driven = run ? drivenWay(run) : { poses: [] };
     const ghost = driven.poses.length ? element("polygon", { class: "driven" }, layer("path")) : null;
     if (ghost) {
-      const track = points(s, driven.poses.map((p) => p.pose));
+      const track = drawing.text(driven.poses.map((p) => p.pose));
       element("polyline", { points: track, class: "driven" }, path);
     }
-    const car = drawCar(vehicle, layer("car"));
-    if (way) drawChanges(s, way, layer("path"));
+    const car = layer("car");
+    drawing.drawCar(car, vehicle, "moving");
+    if (way) drawChanges(way, layer("path"));
     shown = { scene: s, run, vehicle, way, car, driven, ghost };
     showLayers();
     showView();
@@ -238,7 +200,8 @@
     map.style.aspectRatio = `${w} / ${h}`;
     if (state.zoomed) {
       const scale = Math.min(1, ZOOM / w, ZOOM / h * 1.6);
-      const [cx, cy] = local(shown.scene, shown.scene.goal);
+      const { goal } = shown.scene;
+      const [cx, cy] = [goal[0] - x0, y1 - goal[1]];
       const inside = (v, size, limit) => Math.max(0, Math.min(limit - size, v - size / 2));
       [x, y, w, h] = [inside(cx, w * scale, w), inside(cy, h * scale, h), w * scale, h * scale];
     }
@@ -279,14 +242,13 @@
     const { pose, leg, share } = way?.all.length
       ? poseAt(way, state.time)
       : { pose: s.start, leg: null, share: 0 };
-    const [x, y] = local(s, pose);
-    car.setAttribute("transform", `translate(${x} ${y}) rotate(${(-pose[2] * 180) / Math.PI})`);
+    car.setAttribute("transform", drawing.transform(pose));
     if (ghost) {
       const there = drivenAt(driven, (leg.driven + Math.abs(leg.length) * share) / way.driven);
-      ghost.setAttribute("points", points(s, footprint(there, vehicle)));
+      ghost.setAttribute("points", drawing.text(footprint(vehicle, there)));
     }
     const steer = leg ? Math.atan(vehicle.wheelbase * leg.curvature) : 0;
-    for (const wheel of car.front) wheel.setAttribute("transform", `rotate(${(-steer * 180) / Math.PI})`);
+    drawing.steer(car, steer);
     const moving = state.playing || state.time > 0;
     car.classList.toggle("reversing", Boolean(leg) && moving && leg.length < 0);
     car.classList.toggle("advancing", Boolean(leg) && moving && leg.length > 0);
@@ -323,21 +285,55 @@
 
   // ---- Choosing -----------------------------------------------------------------------
 
-  const unique = (list) => [...new Set(list)];
-  const fill = (select, items) => select.replaceChildren(...items.map(([value, text]) => new Option(text, value)));
   const failures = (s) => s.runs.filter((r) => !r.ok && r.applies).length;
+  const count = (n, what) => `${n} ${what}${n === 1 ? "" : "s"}`;
+  const ratio = (over) => `${over.toFixed(over < 1.1 ? 3 : 2)} ×`;
 
-  /** The lists around the scene that is chosen. */
-  function fillLists() {
-    const s = scene();
-    fill(at("kind"), unique(data.scenes.map((c) => c.type)).map((k) => [k, k]));
-    at("kind").value = s.type;
-    const levels = unique(data.scenes.filter((c) => c.type === s.type).map((c) => c.level));
-    fill(at("level"), levels.map((l) => [l, l]));
-    at("level").value = s.level;
-    const scenes = [...data.scenes.entries()].filter(([, c]) => c.type === s.type && c.level === s.level);
-    fill(at("scene"), scenes.map(([i, c]) => [i, failures(c) ? `${c.name} (${failures(c)} failed)` : c.name]));
+  /** In what order scenes are listed: by the chosen method, those with the greatest value first, and what is said of
+      them. Where the value is null they come last. */
+  const ORDERS = {
+    run: { title: "as they were run", by: () => 0, say: (r, s) => (failures(s) ? `${failures(s)} failed` : "") },
+    quality: { title: "worst quality first", by: (r) => r?.over, say: (r) => ratio(r.over) },
+    slowest: { title: "slowest first", by: (r) => r?.applies ? r.time : null, say: (r) => time(r.time) },
+    changes: { title: "most changes first", by: (r) => r?.changes, say: (r) => count(r.changes, "change") },
+    clearance: {
+      title: "least clearance first",
+      by: (r) => (r?.clearance == null ? null : -r.clearance),
+      say: (r) => `${r.clearance.toFixed(3)} m`,
+    },
+    // Those of the chosen method before those of others.
+    failures: {
+      title: "failures first",
+      by: (r, s) => (r && !r.ok && r.applies ? data.methods.length : 0) + failures(s),
+      say: (r, s) => (failures(s) ? `${failures(s)} failed` : ""),
+    },
+  };
+
+  const runOf = (s, method) => s.runs.find((r) => r.method === method);
+
+  /** The scenes that the filter leaves, in order. */
+  function listed() {
+    const { by } = ORDERS[at("order").value];
+    const left = [...data.scenes.keys()].filter((i) => filter.holds(data.scenes[i]));
+    const value = new Map(left.map((i) => [i, by(runOf(data.scenes[i], state.method), data.scenes[i]) ?? -Infinity]));
+    return left.sort((a, b) => (value.get(b) > value.get(a)) - (value.get(b) < value.get(a)) || a - b);
+  }
+
+  let list = [];
+
+  /** Lists the scenes anew, after another method, order or filter was chosen. */
+  function fillList() {
+    const { by, say } = ORDERS[at("order").value];
+    list = listed();
+    const option = (i) => {
+      const s = data.scenes[i];
+      const run = runOf(s, state.method);
+      const words = by(run, s) == null ? "" : say(run, s);
+      return new Option(words ? `${s.name} · ${words}` : s.name, i);
+    };
+    at("scene").replaceChildren(...list.map(option));
     at("scene").value = state.scene;
+    at("scene-label").textContent = `Scene (${list.length})`;
   }
 
   function fillRuns() {
@@ -354,9 +350,10 @@
       const cell = (text, span = 1) => Object.assign(tr.insertCell(), { textContent: text, colSpan: span });
       if (run.applies) [time(run.time), run.nodes].forEach((text) => cell(text));
       if (run.length !== null) {
-        [run.length.toFixed(1), run.changes, run.clearance?.toFixed(3) ?? "–"].forEach((text) => cell(text));
+        const over = run.over === null ? "–" : run.over.toFixed(3);
+        [run.length.toFixed(1), run.changes, over, run.clearance?.toFixed(3) ?? "–"].forEach((text) => cell(text));
       }
-      const remark = cell(verdict(run), run.length !== null ? 1 : run.applies ? 4 : 6);
+      const remark = cell(verdict(run), run.length !== null ? 1 : run.applies ? 5 : 7);
       remark.className = run.ok ? "text" : run.applies ? "text bad" : "text soft";
       tr.addEventListener("click", () => choose(state.scene, run.method));
       radio.addEventListener("change", () => choose(state.scene, run.method));
@@ -365,48 +362,86 @@
     at("runs").tBodies[0].replaceChildren(...scene().runs.map(row));
   }
 
-  function choose(sceneIndex, method) {
+  function choose(sceneIndex, method, silent = false) {
     const same = sceneIndex === state.scene && method === state.method && shown;
     if (same) return;
     play(false);
-    const other = sceneIndex !== state.scene || !shown;
+    const isOther = sceneIndex !== state.scene || !shown;
+    const isOtherMethod = method !== state.method || !shown;
     Object.assign(state, { scene: sceneIndex, method });
-    if (other) {
-      fillLists();
-      fillRuns();
-    }
+    if (isOtherMethod) fillList();
+    at("scene").value = sceneIndex;
+    if (isOther) fillRuns();
     draw();
+    if (silent) return;
     try {
-      history.replaceState(null, "", `#play-${state.scene}-${state.method}`);
+      history.replaceState(null, "", link());
     } catch { /* some viewers of local files forbid it */ }
   }
 
-  /** The first scene of a type and level, or of the type alone. */
-  function jump(kind, level) {
-    const of = (f) => data.scenes.findIndex(f);
-    const exact = of((c) => c.type === kind && c.level === level);
-    choose(exact >= 0 ? exact : of((c) => c.type === kind), state.method);
+  const link = () => `#play-${state.scene}-${state.method}`;
+
+  /** The next scene of the list. */
+  function step(by) {
+    const place = list.indexOf(state.scene);
+    choose(list[(place + by + list.length) % list.length], state.method);
   }
 
-  const step = (by) => choose((state.scene + by + data.scenes.length) % data.scenes.length, state.method);
+  /** Another list, and its first scene unless the one that is shown is to stay. */
+  function relist(staysIfListed) {
+    fillList();
+    if (!list.length || (staysIfListed && list.includes(state.scene))) return;
+    choose(list[0], state.method);
+  }
+
+  /** Shows a scene and a method, whatever the filter is, and leads there. */
+  function open(sceneIndex, method) {
+    try {
+      // A page of its own in the history: going back leads back to the plot.
+      history.pushState(null, "", `#play-${sceneIndex}-${method}`);
+    } catch { /* see above */ }
+    show(sceneIndex, method);
+    goThere();
+  }
+
+  function goThere() {
+    at("gallery").scrollIntoView();
+    at("scene").focus({ preventScroll: true });
+  }
+
+  async function copy() {
+    try {
+      history.replaceState(null, "", link());
+    } catch { /* see above */ }
+    const copied = await navigator.clipboard?.writeText(new URL(link(), location.href).href).then(() => true, () => false);
+    at("copy").textContent = copied ? "Copied" : "It is in the address bar";
+    setTimeout(() => { at("copy").textContent = "Copy link"; }, 2500);
+  }
 
   function zoom() {
     state.zoomed = !state.zoomed;
     showView();
   }
 
+  /** Shows a scene, also one that the filter hides. */
+  function show(sceneIndex, method) {
+    if (!filter.holds(data.scenes[sceneIndex])) filter.clear();
+    choose(sceneIndex, method);
+  }
+
   /** Follows `#play-SCENE-METHOD` or `#play-SCENE-METHOD-SECONDS`. */
   function follow() {
     const [, s, m, t] = /^#play-(\d+)-(\d+)(?:-([\d.]+))?$/.exec(location.hash) ?? [];
     if (s === undefined || !data.scenes[s] || !data.methods[m]) return false;
-    choose(Number(s), Number(m));
+    show(Number(s), Number(m));
     seek(Number(t ?? 0));
     return true;
   }
 
   function listen() {
-    at("kind").addEventListener("change", () => jump(at("kind").value, scene().level));
-    at("level").addEventListener("change", () => jump(scene().type, at("level").value));
+    at("order").addEventListener("change", () => relist(false));
+    filter.whenChanged(() => relist(true));
+    at("copy").addEventListener("click", copy);
     at("scene").addEventListener("change", () => choose(Number(at("scene").value), state.method));
     at("previous").addEventListener("click", () => step(-1));
     at("next").addEventListener("click", () => step(1));
@@ -418,7 +453,7 @@
     at("zoom").addEventListener("click", zoom);
     document.querySelector(".layers").addEventListener("change", showLayers);
     addEventListener("hashchange", () => {
-      if (follow()) at("gallery").scrollIntoView();
+      if (follow()) goThere();
     });
     at("gallery").addEventListener("keydown", (event) => {
       const target = event.target;
@@ -438,8 +473,20 @@
     });
   }
 
+  /** A scene and what a method did there, in a line. */
+  function describe(sceneIndex, method) {
+    const s = data.scenes[sceneIndex];
+    const run = runOf(s, method);
+    const facts = [s.name, data.methods[method], time(run.time)];
+    if (run.ok) facts.push(`cost ${ratio(run.over ?? 1)}`, count(run.changes, "change"));
+    else facts.push(verdict(run));
+    if (run.clearance !== null) facts.push(`${run.clearance.toFixed(3)} m clear`);
+    return facts.join(" · ");
+  }
+
   // ---- Start --------------------------------------------------------------------------
 
+  at("order").replaceChildren(...Object.entries(ORDERS).map(([name, { title }]) => new Option(title, name)));
   if (data.scenes.length) {
     document.querySelector(".viewer").hidden = false;
     listen();
@@ -448,13 +495,12 @@
     } else {
       // At first a scene of the last, hardest setting, and our own method if it takes part.
       const last = data.scenes.at(-1);
-      state.scene = data.scenes.findIndex((s) => s.type === last.type && s.level === last.level);
       const ours = data.methods.indexOf("n3p");
-      state.method = ours >= 0 ? ours : data.methods.length - 1;
-      fillLists();
-      fillRuns();
-      draw();
+      const first = data.scenes.findIndex((s) => s.world === last.world && s.type === last.type && s.level === last.level);
+      choose(filter.holds(data.scenes[first]) ? first : listed()[0], ours >= 0 ? ours : data.methods.length - 1, true);
     }
   }
   document.documentElement.dataset.ready = data.scenes.length;
-}
+
+  return { methods: data.scenes.length ? data.methods : [], open, describe };
+})();

@@ -1,29 +1,36 @@
 //! `report.html`: one page that needs nothing but itself.
 //!
-//! The page's parts lie beside this file: `page.html` (a template), `style.css`, `theme.js`
-//! and `gallery.js`. This module fills in what the template names: `tables`, `plots`
-//! (SVG, so that both can be read without scripts) and the data of the [`gallery`].
+//! The page's parts lie beside this file: `page.html` (a template), `style.css` and the scripts: `theme.js`,
+//! `filter.js` (one world, type or level alone), `gallery.js` (scenes and paths), `points.js` (from a point of a
+//! plot to its scene). This module fills in what the template names: `tables`, `plots` and `points` (SVG, so that
+//! all can be read without scripts) and the data of the [`gallery`].
 
+mod axis;
 mod curve;
+mod filter;
 pub mod gallery;
+mod marks;
 mod plots;
+mod points;
 mod tables;
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 use minijinja::value::Serde;
 use minijinja::{Environment, UndefinedBehavior};
 use serde::Serialize;
 
-use super::learning_curve::{self, CurvePoint};
+use super::away;
+use super::drives;
+use super::learning_curve;
 use super::metrics;
 use super::quality;
-use super::report::{CURVE_NOTE, NOTES, Provenance};
+use super::report::{CURVE_NOTE, NOTES, Results};
 use super::table::Table;
 use super::trace::Trace;
 use crate::episode::Case;
-use crate::episode::Row;
 use crate::n3p::Method;
+use filter::Choices;
 use gallery::Gallery;
 
 /// What the template names.
@@ -32,22 +39,28 @@ struct Page<'a> {
     title: &'a str,
     command: &'a str,
     facts: Vec<(&'static str, String)>,
-    methods: Vec<tables::MethodLine>,
+    choices: Choices,
+    slices: Vec<tables::Slice>,
     scenes: usize,
-    settings: usize,
-    episodes: usize,
-    rejected: usize,
     columns: Vec<tables::Column>,
     levels: Vec<tables::LevelTable>,
     speed_ups: Vec<tables::SpeedLine>,
-    quality: Vec<tables::QualityLine>,
+    quality: Vec<tables::QualityGroup>,
     quality_note: &'static str,
     home_and_away: Vec<plots::PanelView>,
+    away_sentence: Option<String>,
+    away_table: Table,
+    away_note: &'static str,
     speed_plot: Vec<plots::PanelView>,
+    point_plot: Vec<plots::PanelView>,
+    point_keys: Vec<points::Key>,
     time_plot: Vec<plots::PanelView>,
     node_plot: Vec<plots::PanelView>,
     dots: usize,
-    curve: Vec<curve::CurveView>,
+    drives: Vec<tables::DriveLine>,
+    drive_headers: [&'static str; drives::HEADERS.len()],
+    drive_note: &'static str,
+    curve: Vec<plots::PanelView>,
     curve_table: Option<Table>,
     curve_note: &'static str,
     failures: Vec<tables::Failure>,
@@ -61,15 +74,9 @@ struct Page<'a> {
     scripts: Vec<&'static str>,
 }
 
-/// The page of a run. `curve` may be empty; `shown` are the [`gallery::chosen`] cases, `traces` theirs.
-pub fn page(
-    title: &str,
-    rows: &[Row],
-    curve: &[CurvePoint],
-    provenance: &Provenance,
-    shown: &[&Case],
-    traces: &[Trace],
-) -> String {
+/// The page of a run. `shown` are the [`gallery::chosen`] cases, `traces` theirs.
+pub fn page(results: &Results, shown: &[&Case], traces: &[Trace]) -> String {
+    let &Results { title, rows, drives, curve, provenance } = results;
     let groups = metrics::summarise(rows, provenance.seed);
     let totals = metrics::totals(rows);
     // Methods that apply nowhere have no place in tables and plots.
@@ -78,30 +85,38 @@ pub fn page(
     let gallery = Gallery::new(shown, rows, traces);
     let scene_index: HashMap<&str, usize> =
         gallery.scenes.iter().enumerate().map(|(i, s)| (s.name.as_str(), i)).collect();
-    let failures = tables::failures(rows, &scene_index, &gallery.methods);
+    let choices = Choices::new(rows);
+    let slices = tables::slices(&choices, rows);
+    let compared = away::compare(rows, None);
     let view = Page {
         title,
         command: &provenance.command,
         facts: provenance.facts().to_vec(),
-        methods: tables::methods(&totals),
-        scenes: rows.iter().map(|r| &r.scene).collect::<HashSet<_>>().len(),
-        settings: groups.len(),
-        episodes: rows.iter().filter(|r| r.applies()).count(),
-        rejected: rows.iter().filter(|r| r.is_rejected()).count(),
+        scenes: slices[0].scenes,
+        choices,
         columns: tables::COLUMNS.to_vec(),
         levels: tables::levels(&groups, &methods),
         speed_ups: tables::speed_ups(&groups),
-        quality: tables::quality(&quality::summarise(rows)),
+        quality: tables::quality(&quality::summarise(rows), &slices),
+        slices,
         quality_note: quality::NOTE,
-        home_and_away: plots::home_and_away(&methods, rows),
+        home_and_away: plots::home_and_away(rows),
+        away_sentence: away::sentence(&compared),
+        away_table: away::table(&compared),
+        away_note: away::NOTE,
         speed_plot: plots::speed_ups(&groups, &methods).panels(),
-        time_plot: plots::times(&groups, &methods, rows).panels(),
-        node_plot: plots::nodes(&groups, &methods, rows).panels(),
-        dots: plots::DOTS,
+        point_plot: points::panels(&groups, &gallery),
+        point_keys: points::keys(&gallery),
+        time_plot: plots::times(&groups, &methods, rows, &scene_index).panels(),
+        node_plot: plots::nodes(&groups, &methods, rows, &scene_index).panels(),
+        dots: marks::DOTS,
+        drives: tables::drives(drives),
+        drive_headers: drives::HEADERS,
+        drive_note: drives::NOTE,
         curve: curve::panels(curve),
         curve_table: (!curve.is_empty()).then(|| learning_curve::table(curve)),
         curve_note: CURVE_NOTE,
-        failures,
+        failures: tables::failures(rows, &scene_index, &gallery.methods),
         notes: NOTES.trim().split("\n\n").collect(),
         first: gallery::FIRST,
         more: gallery::FAILED,
@@ -109,7 +124,14 @@ pub fn page(
         driven: traces.iter().any(|trace| !trace.driven.is_empty()),
         data: embedded(&gallery),
         style: include_str!("style.css"),
-        scripts: vec![include_str!("theme.js"), include_str!("gallery.js")],
+        scripts: vec![
+            include_str!("theme.js"),
+            include_str!("../../../output/page/geometry.js"),
+            include_str!("../../../output/page/drawing.js"),
+            include_str!("filter.js"),
+            include_str!("gallery.js"),
+            include_str!("points.js"),
+        ],
     };
     let mut engine = Environment::new();
     engine.set_undefined_behavior(UndefinedBehavior::Strict);
@@ -152,7 +174,9 @@ fn escape(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::metrics::tests::row;
+    use super::super::report::Provenance;
     use super::*;
+    use crate::episode::Row;
     use crate::geometry::Pose;
     use crate::planners::Budget;
     use crate::vehicle::Vehicle;
@@ -172,8 +196,9 @@ mod tests {
     }
 
     fn whole_page(cases: &[Case], rows: &[Row], traces: &[Trace]) -> String {
-        let provenance = Provenance::here("by hand".into(), 7, Budget::new(100), 1);
-        page("A & B", rows, &[], &provenance, &gallery::chosen(cases, rows), traces)
+        let provenance = &Provenance::here("by hand".into(), 7, Budget::new(100), 1);
+        let results = Results { title: "A & B", rows, drives: &[], curve: &[], provenance };
+        page(&results, &gallery::chosen(cases, rows), traces)
     }
 
     /// The text between `before` and `after`.
@@ -215,7 +240,8 @@ mod tests {
         assert_eq!(gallery, Gallery::new(&cases.iter().collect::<Vec<_>>(), &rows, &traces));
         assert_eq!(gallery.scenes[1].name, NAME);
         let run = &gallery.scenes[1].runs[1];
-        assert_eq!((run.start, &run.segments), (traces[0].start, &traces[0].segments));
+        assert_eq!(run.start, Some(Pose::new(0.3, -0.333333, 0.0)), "to the micrometre");
+        assert_eq!(run.segments, [[0.14285714, -0.7], [0.0, 0.333333]]);
         assert!(html.contains("href=\"#play-1-0\""), "the failure leads to its scene");
         assert_eq!(html, whole_page(&cases, &rows, &traces), "same rows, same page");
     }
@@ -239,11 +265,18 @@ mod tests {
     }
 
     #[test]
-    fn the_gallery_takes_the_first_scenes_and_some_failures() {
-        let cases = cases(60);
+    fn the_gallery_takes_all_scenes_and_of_very_many_the_first_and_some_failures() {
+        let one = cases(1).remove(0);
+        let named = |i: usize| {
+            let mut case = one.clone();
+            case.scene.name = i.to_string();
+            case
+        };
+        let cases: Vec<Case> = (0..=gallery::ALL).map(named).collect();
         let name = |i: usize| cases[i].scene.name.clone();
         let rows: Vec<Row> =
-            (0..60).map(|i| row(&name(i), "ha-rs", 0.1, i < 15 || i % 2 == 1)).collect();
+            (0..cases.len()).map(|i| row(&name(i), "ha-rs", 0.1, i < 15 || i % 2 == 1)).collect();
+        assert_eq!(gallery::chosen(&cases[1..], &rows).len(), gallery::ALL);
         let chosen = gallery::chosen(&cases, &rows);
         assert_eq!(chosen.len(), gallery::FIRST + gallery::FAILED);
         assert_eq!(chosen[gallery::FIRST].scene.name, name(16));

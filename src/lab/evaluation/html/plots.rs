@@ -1,30 +1,29 @@
 //! Plots as SVG, drawn here so that they need no script: one panel for each type and level,
 //! one line in it for each method. Colours come from the page's style sheet.
 
-use std::collections::BTreeSet;
+use std::collections::HashMap;
 use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::super::metrics::{Group, percentile};
+use super::super::away::{self, HomeAndAway, Side};
+use super::super::metrics::Group;
 use super::super::table::{self, figures, kind_name, part_name};
+use super::axis::{Axis, count, factor, seconds};
+use super::filter::Setting;
+use super::marks::{Dot, Mark};
 use super::tables::paper_ratio;
 use super::{escape, family};
 use crate::episode::Row;
 use crate::world::ParkingType;
 
-/// Dots drawn in a line; of more scenes, so many evenly spaced ranks.
-pub const DOTS: usize = 150;
-
 /// Sizes, in the panel's own units (about a pixel).
-const WIDTH: f64 = 400.0;
-const LEFT: f64 = 66.0;
-const RIGHT: f64 = 20.0;
+pub(super) const WIDTH: f64 = 400.0;
+pub(super) const LEFT: f64 = 66.0;
+pub(super) const RIGHT: f64 = 20.0;
 const TOP: f64 = 8.0;
 const LINE: f64 = 27.0;
 const BOTTOM: f64 = 34.0;
-/// Room for the value zero at the left of a logarithmic axis.
-const ZERO: f64 = 30.0;
 
 /// One plot: panels that share their axis.
 pub struct Plot {
@@ -38,8 +37,8 @@ pub struct Plot {
 
 /// One type and level.
 struct Panel {
-    level: String,
-    kind: String,
+    heading: String,
+    setting: Setting,
     lines: Vec<(String, Mark)>,
 }
 
@@ -47,58 +46,35 @@ struct Panel {
 #[derive(Serialize)]
 pub struct PanelView {
     pub heading: String,
+    /// Of its element: which scenes it shows.
+    pub attributes: String,
     pub svg: String,
 }
 
-/// What a method's line shows.
-enum Mark {
-    /// The method does not apply here.
-    Nothing,
-    /// It is what the others are compared with.
-    Reference,
-    /// One value for each scene, sorted, solved ones and failures.
-    Values { solved: Vec<f64>, failed: Vec<f64> },
-    /// A number with its interval, and the paper's number.
-    Ratio { ratio: f64, low: f64, high: f64, paper: Option<f64> },
-    /// A number at home and one away, each where there are such scenes.
-    HomeAndAway { home: Option<f64>, away: Option<f64> },
+/// Planning times of every scene; `shown` are the gallery's scenes by name.
+pub fn times(
+    groups: &[Group],
+    methods: &[&str],
+    rows: &[Row],
+    shown: &HashMap<&str, usize>,
+) -> Plot {
+    let panels = values(groups, methods, rows, shown, |r| r.plan_time_s);
+    let value = |v: f64| format!("{} ms", figures(v * 1e3));
+    let axis = Axis::decades("planning time", false, seconds, value, all_values(&panels));
+    Plot { what: "Planning times", axis, unity: false, panels }
 }
 
-/// A logarithmic axis over whole decades.
-struct Axis {
-    title: &'static str,
-    low: i32,
-    high: i32,
-    /// Whether zero has a place of its own.
-    zero: bool,
-    tick: fn(i32) -> String,
-    value: fn(f64) -> String,
-}
-
-/// Planning times of every scene.
-pub fn times(groups: &[Group], methods: &[&str], rows: &[Row]) -> Plot {
-    let axis = Axis {
-        title: "planning time",
-        low: 0,
-        high: 0,
-        zero: false,
-        tick: seconds,
-        value: |v| format!("{} ms", figures(v * 1e3)),
-    };
-    values("Planning times", axis, groups, methods, rows, |r| r.plan_time_s)
-}
-
-/// Node expansions in every scene.
-pub fn nodes(groups: &[Group], methods: &[&str], rows: &[Row]) -> Plot {
-    let axis = Axis {
-        title: "node expansions",
-        low: 0,
-        high: 0,
-        zero: true,
-        tick: count,
-        value: |v| format!("{v:.0}"),
-    };
-    values("Node expansions", axis, groups, methods, rows, |r| f64::from(r.nodes))
+/// Node expansions in every scene; `shown` are the gallery's scenes by name.
+pub fn nodes(
+    groups: &[Group],
+    methods: &[&str],
+    rows: &[Row],
+    shown: &HashMap<&str, usize>,
+) -> Plot {
+    let panels = values(groups, methods, rows, shown, |r| f64::from(r.nodes));
+    let value = |v: f64| format!("{v:.0}");
+    let axis = Axis::decades("node expansions", true, count, value, all_values(&panels));
+    Plot { what: "Node expansions", axis, unity: false, panels }
 }
 
 /// Paired speed-ups with their intervals.
@@ -115,73 +91,76 @@ pub fn speed_ups(groups: &[Group], methods: &[&str]) -> Plot {
             paper: paper_ratio(&printed, g, s),
         })
     };
-    let axis = Axis {
-        title: "times as fast as the fastest graph search",
-        low: 0,
-        high: 0,
-        zero: false,
-        tick: times_faster,
-        value: |v| format!("{} ×", figures(v)),
-    };
-    Plot::new("Speed-ups", axis, true, groups, methods, mark)
+    let panels = panels_of(groups, methods, mark);
+    let title = "times as fast as the fastest graph search";
+    let axis = Axis::decades(title, false, factor, times_as_fast, all_values(&panels));
+    Plot { what: "Speed-ups", axis, unity: true, panels }
 }
 
-/// How much faster than `ha-rs` methods are by mean, at home (all levels together) and away (all other
-/// sets): one panel for each parking type. Empty unless the run has both and `ha-rs` among its methods.
-pub fn home_and_away(methods: &[&str], rows: &[Row]) -> Vec<PanelView> {
-    const HOME: &str = "home";
-    const REFERENCE: &str = "ha-rs";
-    let sets: BTreeSet<&str> = rows.iter().map(|r| r.set.as_str()).collect();
-    if !sets.contains(HOME) || sets.len() < 2 || !methods.contains(&REFERENCE) {
-        return Vec::new();
-    }
-    let mean = |kind: Option<ParkingType>, is_home: bool, method: &str| {
-        let is_one = |r: &&Row| {
-            r.kind == kind && (r.set == HOME) == is_home && r.method == method && r.applies()
+/// Home against away: speed, quality and failures of every method, over all types and then for each of them.
+/// Empty unless the run has both.
+pub fn home_and_away(rows: &[Row]) -> Vec<PanelView> {
+    let kinds = rows.iter().fold(Vec::new(), |mut kinds: Vec<Option<ParkingType>>, row| {
+        if !kinds.contains(&row.kind) {
+            kinds.push(row.kind);
+        }
+        kinds
+    });
+    let all = [("all types".to_owned(), Setting::default(), away::compare(rows, None))];
+    let of_kind = |kind: Option<ParkingType>| {
+        let name = kind_name(kind);
+        (name.clone(), Setting::of_kind(name), away::compare(rows, Some(kind)))
+    };
+    // Of one type alone the first row says it all.
+    let each = kinds.iter().filter(|_| kinds.len() > 1).map(|&kind| of_kind(kind));
+    let parts: Vec<_> =
+        all.into_iter().chain(each).filter(|(_, _, lines)| !lines.is_empty()).collect();
+    type Value = fn(Side) -> Option<f64>;
+    let plot = |what: &'static str, value: Value, unity: bool, axis: fn(Vec<f64>) -> Axis| {
+        let mark =
+            |line: &HomeAndAway| match [line.home, line.away].map(|side| side.and_then(value)) {
+                [None, None] => Mark::Nothing,
+                [home, away] => Mark::HomeAndAway { home, away },
+            };
+        let panel = |(name, setting, lines): &(String, Setting, Vec<HomeAndAway>)| Panel {
+            heading: format!("{what}, {name}"),
+            setting: setting.clone(),
+            lines: lines.iter().map(|l| (l.method.clone(), mark(l))).collect(),
         };
-        let times: Vec<f64> = rows.iter().filter(is_one).map(|r| r.plan_time_s).collect();
-        (!times.is_empty()).then(|| times.iter().sum::<f64>() / times.len() as f64)
+        let panels: Vec<Panel> = parts.iter().map(panel).collect();
+        let axis = axis(all_values(&panels).collect());
+        Plot { what: "Home against away", axis, unity, panels }.panels()
     };
-    let mark = |kind: Option<ParkingType>, method: &str| {
-        if method == REFERENCE {
-            return Mark::Reference;
-        }
-        let [home, away] = [true, false].map(|is_home| {
-            Some(mean(kind, is_home, REFERENCE)? / mean(kind, is_home, method)?.max(1e-9))
-        });
-        match (home, away) {
-            (None, None) => Mark::Nothing,
-            _ => Mark::HomeAndAway { home, away },
-        }
+    let speed = |values: Vec<f64>| {
+        let title = "times as fast as ha-rs, by mean";
+        Axis::decades(title, false, factor, times_as_fast, values.into_iter())
     };
-    let kinds: BTreeSet<Option<ParkingType>> = rows.iter().map(|r| r.kind).collect();
-    let panel = |&kind: &Option<ParkingType>| Panel {
-        level: "home and away".to_owned(),
-        kind: kind_name(kind),
-        lines: methods.iter().map(|m| ((*m).to_owned(), mark(kind, m))).collect(),
+    let cost = |values: Vec<f64>| {
+        Axis::over_one("cost over the cheapest, 95th percentile", values.into_iter())
     };
-    let panels: Vec<Panel> = kinds.iter().map(panel).collect();
-    let axis = Axis {
-        title: "times as fast as ha-rs, by mean",
-        low: 0,
-        high: 0,
-        zero: false,
-        tick: times_faster,
-        value: |v| format!("{} ×", figures(v)),
-    };
-    let marks = panels.iter().flat_map(|p| &p.lines).map(|(_, mark)| mark);
-    let axis = axis.around(marks.flat_map(Mark::values));
-    Plot { what: "Home against away", axis, unity: true, panels }.panels()
+    let failed = |values: Vec<f64>| Axis::percent("scenes without a path", values.into_iter());
+    let share = |side: Side| Some(100.0 * side.failed as f64 / side.scenes as f64);
+    let columns = [
+        plot("Speed", |side| side.faster, true, speed),
+        plot("Quality", |side| side.p95_cost, false, cost),
+        plot("Failures", share, false, failed),
+    ];
+    // Row by row: the three of all types are the first picture.
+    let mut columns = columns.map(Vec::into_iter);
+    let mut views = Vec::new();
+    for _ in 0..parts.len() {
+        views.extend(columns.iter_mut().filter_map(Iterator::next));
+    }
+    views
 }
 
 fn values(
-    what: &'static str,
-    axis: Axis,
     groups: &[Group],
     methods: &[&str],
     rows: &[Row],
+    shown: &HashMap<&str, usize>,
     value: fn(&Row) -> f64,
-) -> Plot {
+) -> Vec<Panel> {
     let mark = |g: &Group, method: &str| {
         let mine = rows.iter().filter(|r| {
             (&r.set, r.level, r.kind) == (&g.set, g.level, g.kind)
@@ -190,42 +169,47 @@ fn values(
         });
         let (solved, failed): (Vec<&Row>, Vec<&Row>) = mine.partition(|r| r.ok);
         let sorted = |rows: Vec<&Row>| {
-            let mut values: Vec<f64> = rows.into_iter().map(value).collect();
-            values.sort_by(f64::total_cmp);
-            values
+            let dot =
+                |row: &Row| Dot { value: value(row), scene: shown.get(&row.scene[..]).copied() };
+            let mut dots: Vec<Dot> = rows.into_iter().map(dot).collect();
+            dots.sort_by(|a, b| a.value.total_cmp(&b.value));
+            dots
         };
         if solved.is_empty() && failed.is_empty() {
             return Mark::Nothing;
         }
         Mark::Values { solved: sorted(solved), failed: sorted(failed) }
     };
-    Plot::new(what, axis, false, groups, methods, mark)
+    panels_of(groups, methods, mark)
+}
+
+fn panels_of(
+    groups: &[Group],
+    methods: &[&str],
+    mark: impl Fn(&Group, &str) -> Mark,
+) -> Vec<Panel> {
+    let panel = |g: &Group| Panel {
+        heading: format!("{}, {}", part_name(&g.set, g.level), kind_name(g.kind)),
+        setting: Setting::new(&g.set, g.kind, g.level),
+        lines: methods.iter().map(|m| ((*m).to_owned(), mark(g, m))).collect(),
+    };
+    groups.iter().map(panel).collect()
+}
+
+fn all_values(panels: &[Panel]) -> impl Iterator<Item = f64> + '_ {
+    panels.iter().flat_map(|p| &p.lines).flat_map(|(_, mark)| mark.values())
+}
+
+fn times_as_fast(v: f64) -> String {
+    format!("{} ×", figures(v))
 }
 
 impl Plot {
-    fn new(
-        what: &'static str,
-        axis: Axis,
-        unity: bool,
-        groups: &[Group],
-        methods: &[&str],
-        mark: impl Fn(&Group, &str) -> Mark,
-    ) -> Self {
-        let panel = |g: &Group| Panel {
-            level: part_name(&g.set, g.level),
-            kind: kind_name(g.kind),
-            lines: methods.iter().map(|m| ((*m).to_owned(), mark(g, m))).collect(),
-        };
-        let panels: Vec<Panel> = groups.iter().map(panel).collect();
-        let marks = panels.iter().flat_map(|p| &p.lines).map(|(_, mark)| mark);
-        let axis = axis.around(marks.flat_map(Mark::values));
-        Self { what, axis, unity, panels }
-    }
-
     /// The panels, drawn.
     pub fn panels(&self) -> Vec<PanelView> {
         let view = |p: &Panel| PanelView {
-            heading: format!("{}, {}", p.level, p.kind),
+            heading: p.heading.clone(),
+            attributes: p.setting.attributes(),
             svg: self.panel(p),
         };
         self.panels.iter().map(view).collect()
@@ -234,233 +218,52 @@ impl Plot {
     fn panel(&self, panel: &Panel) -> String {
         let bottom = TOP + LINE * panel.lines.len() as f64;
         let height = bottom + BOTTOM;
-        let (what, level, kind) = (self.what, &panel.level, &panel.kind);
+        let describe = |mark: &Mark| mark.describe(self.axis.value);
         let described: Vec<String> =
-            panel.lines.iter().map(|(m, mark)| format!("{m}: {}", self.describe(mark))).collect();
+            panel.lines.iter().map(|(m, mark)| format!("{m}: {}", describe(mark))).collect();
         let mut svg = format!(
-            "<svg viewBox=\"0 0 {WIDTH} {height}\" role=\"img\"><title>{what}, {level}, {kind}\
-             </title><desc>{}</desc>\n",
+            "<svg viewBox=\"0 0 {WIDTH} {height}\" role=\"img\"><title>{}, {}</title><desc>{}</desc>\n",
+            self.what,
+            escape(&panel.heading),
             escape(&described.join("; "))
         );
         self.draw_axis(&mut svg, bottom);
+        let x = |v: f64| LEFT + self.axis.share(v) * (WIDTH - LEFT - RIGHT);
         for (i, (method, mark)) in panel.lines.iter().enumerate() {
             let y = TOP + LINE * (i as f64 + 0.5);
             let _ = write!(
                 svg,
-                "<g class=\"f-{}\"><title>{m}: {}</title><rect class=\"hit\" y=\"{}\" \
+                "<g class=\"f-{}\" data-name=\"{m}\"><title>{m}: {}</title><rect class=\"hit\" y=\"{}\" \
                  width=\"{WIDTH}\" height=\"{LINE}\"/><text class=\"m\" x=\"{}\" y=\"{}\">{m}\
                  </text>",
                 family(method),
-                escape(&self.describe(mark)),
+                escape(&describe(mark)),
                 y - LINE / 2.0,
                 LEFT - 8.0,
                 y + 4.0,
                 m = escape(method),
             );
-            self.draw_mark(&mut svg, mark, y);
+            mark.draw(&mut svg, x, y);
             svg += "</g>\n";
         }
         svg + "</svg>"
     }
 
-    fn describe(&self, mark: &Mark) -> String {
-        let text = self.axis.value;
-        match mark {
-            Mark::Nothing => "not applicable".to_owned(),
-            Mark::Reference => "the reference, the fastest graph search".to_owned(),
-            Mark::Values { solved, failed } => {
-                let all = merged(solved, failed);
-                let at = |q| text(percentile(&all, q));
-                let fails = match failed.len() {
-                    0 => String::new(),
-                    n => format!(", {n} failed"),
-                };
-                format!(
-                    "median {}, quartiles {} to {}, 5th to 95th percentile {} to {}, {} scenes\
-                     {fails}",
-                    at(0.5),
-                    at(0.25),
-                    at(0.75),
-                    at(0.05),
-                    at(0.95),
-                    all.len()
-                )
-            }
-            Mark::HomeAndAway { home, away } => {
-                let of = |v: &Option<f64>| v.map_or("no scenes".to_owned(), text);
-                format!("at home {}, away {}", of(home), of(away))
-            }
-            Mark::Ratio { ratio, low, high, paper } => {
-                let paper = paper.map_or(String::new(), |p| format!(", in the paper {}", text(p)));
-                format!("{} ({} to {}){paper}", text(*ratio), text(*low), text(*high))
-            }
-        }
-    }
-
     fn draw_axis(&self, svg: &mut String, bottom: f64) {
-        let axis = &self.axis;
+        let room = WIDTH - LEFT - RIGHT;
         // Labels get 40 units each at least.
-        let room = (WIDTH - LEFT - RIGHT) / f64::from(axis.high - axis.low).max(1.0);
-        let every = (40.0 / room).ceil().max(1.0) as i32;
-        let mut tick = |x: f64, label: String, class: &str| {
-            let x = num(x);
+        for (value, label) in self.axis.ticks(40.0 / room) {
+            let x = num(LEFT + self.axis.share(value) * room);
+            let class = if self.unity && value == 1.0 { "grid one" } else { "grid" };
             let _ = write!(svg, "<path class=\"{class}\" d=\"M{x} {TOP}V{bottom}\"/>");
             if !label.is_empty() {
                 let y = bottom + 13.0;
                 let _ = write!(svg, "<text class=\"t\" x=\"{x}\" y=\"{y}\">{label}</text>");
             }
-        };
-        if axis.zero {
-            tick(axis.x(0.0), "0".to_owned(), "grid");
         }
-        for decade in axis.low..=axis.high {
-            let wanted = (decade - axis.low) % every == 0;
-            let label = if wanted { (axis.tick)(decade) } else { String::new() };
-            let class = if self.unity && decade == 0 { "grid one" } else { "grid" };
-            tick(axis.x(10f64.powi(decade)), label, class);
-        }
-        let (x, y) = ((LEFT + WIDTH - RIGHT) / 2.0, bottom + 28.0);
-        let _ = writeln!(svg, "<text class=\"t\" x=\"{x}\" y=\"{y}\">{}</text>", axis.title);
+        let (x, y) = (LEFT + room / 2.0, bottom + 28.0);
+        let _ = writeln!(svg, "<text class=\"t\" x=\"{x}\" y=\"{y}\">{}</text>", self.axis.title);
     }
-
-    fn draw_mark(&self, svg: &mut String, mark: &Mark, y: f64) {
-        let x = |v: f64| num(self.axis.x(v));
-        match mark {
-            Mark::Nothing => {
-                let _ = write!(svg, "<text class=\"none\" x=\"{LEFT}\" y=\"{}\">–</text>", y + 4.0);
-            }
-            Mark::Reference => {
-                let d = format!("M{} {}l5 5l-5 5l-5-5z", x(1.0), y - 5.0);
-                let _ = write!(svg, "<path class=\"mean ref\" d=\"{d}\"/>");
-            }
-            Mark::HomeAndAway { home, away } => {
-                if let (Some(home), Some(away)) = (home, away) {
-                    let _ =
-                        write!(svg, "<path class=\"ci\" d=\"M{} {y}H{}\"/>", x(*home), x(*away));
-                }
-                for (value, class) in [(away, "mean ref"), (home, "mean")] {
-                    if let Some(value) = value {
-                        let cx = x(*value);
-                        let _ = write!(
-                            svg,
-                            "<circle class=\"{class}\" cx=\"{cx}\" cy=\"{y}\" r=\"4.5\"/>"
-                        );
-                    }
-                }
-            }
-            Mark::Ratio { ratio, low, high, paper } => {
-                // Ours above, the paper's below: neither hides the other.
-                let (ours, theirs) = (y - 4.0, y + 5.0);
-                let d = format!("M{} {ours}H{}", x(*low), x(*high));
-                let caps = [low, high].map(|v| format!("M{} {}v8", x(*v), ours - 4.0)).concat();
-                let _ = write!(svg, "<path class=\"ci\" d=\"{d}{caps}\"/>");
-                if let Some(paper) = paper {
-                    let d = format!("M{} {}l4.5 8h-9z", x(*paper), theirs - 4.0);
-                    let _ = write!(svg, "<path class=\"paper-mark\" d=\"{d}\"/>");
-                }
-                let cx = x(*ratio);
-                let _ = write!(svg, "<circle class=\"mean\" cx=\"{cx}\" cy=\"{ours}\" r=\"4\"/>");
-            }
-            Mark::Values { solved, failed } => {
-                // Neighbours by rank are spread by the golden ratio, within ± 7.
-                let spread = |i: usize| y + 14.0 * ((i as f64 * 0.618_034).fract() - 0.5);
-                let dots: String =
-                    some(solved).map(|(i, v)| format!("M{} {}h0", x(v), num(spread(i)))).collect();
-                let _ = write!(svg, "<path class=\"dots\" d=\"{dots}\"/>");
-                let all = merged(solved, failed);
-                let at = |q| x(percentile(&all, q));
-                let (q1, q3) = (at(0.25), at(0.75));
-                let _ = write!(
-                    svg,
-                    "<path class=\"box\" d=\"M{} {y}H{q1}M{q3} {y}H{}M{q1} {}H{q3}v12H{q1}z\"/>\
-                     <path class=\"median\" d=\"M{} {}v16\"/>",
-                    at(0.05),
-                    at(0.95),
-                    y - 6.0,
-                    at(0.5),
-                    y - 8.0,
-                );
-                if !failed.is_empty() {
-                    let crosses: String = some(failed)
-                        .map(|(i, v)| (self.axis.x(v), spread(i)))
-                        .map(|(x, y)| format!("M{} {}l5 5m0-5l-5 5", num(x - 2.5), num(y - 2.5)))
-                        .collect();
-                    let _ = write!(svg, "<path class=\"failed\" d=\"{crosses}\"/>");
-                }
-            }
-        }
-    }
-}
-
-impl Mark {
-    /// The values that the axis must show.
-    fn values(&self) -> Vec<f64> {
-        match self {
-            Mark::Nothing => Vec::new(),
-            Mark::Reference => vec![1.0],
-            Mark::Values { solved, failed } => merged(solved, failed),
-            Mark::HomeAndAway { home, away } => home.iter().chain(away).copied().collect(),
-            Mark::Ratio { low, high, paper, .. } => {
-                [*low, *high].into_iter().chain(*paper).collect()
-            }
-        }
-    }
-}
-
-impl Axis {
-    /// The same over the decades of `values`; one at least.
-    fn around(self, values: impl Iterator<Item = f64>) -> Self {
-        let logs = values.filter(|v| v.is_finite() && *v > 0.0).map(f64::log10);
-        let range = logs.fold(None, |range: Option<(f64, f64)>, v| {
-            Some(range.map_or((v, v), |(low, high)| (low.min(v), high.max(v))))
-        });
-        let (low, high) = range.unwrap_or((0.0, 1.0));
-        let low = if self.zero { 0 } else { low.floor() as i32 };
-        Self { low, high: (high.ceil() as i32).max(low + 1), ..self }
-    }
-
-    fn x(&self, v: f64) -> f64 {
-        let left = if self.zero { LEFT + ZERO } else { LEFT };
-        if v <= 0.0 {
-            return if self.zero { LEFT + 8.0 } else { LEFT };
-        }
-        let share = (v.log10() - f64::from(self.low)) / f64::from(self.high - self.low);
-        left + share.clamp(0.0, 1.0) * (WIDTH - RIGHT - left)
-    }
-}
-
-fn merged(a: &[f64], b: &[f64]) -> Vec<f64> {
-    let mut all = [a, b].concat();
-    all.sort_by(f64::total_cmp);
-    all
-}
-
-/// At most [`DOTS`] of the sorted values with their ranks, evenly spaced, ends included.
-fn some(values: &[f64]) -> impl Iterator<Item = (usize, f64)> + '_ {
-    let n = values.len().min(DOTS);
-    (0..n).map(move |i| (i, values[i * (values.len() - 1) / (n - 1).max(1)]))
-}
-
-fn seconds(decade: i32) -> String {
-    let (unit, base) = match decade {
-        ..-6 => ("ns", -9),
-        -6..-3 => ("µs", -6),
-        -3..0 => ("ms", -3),
-        _ => ("s", 0),
-    };
-    format!("{} {unit}", 10i64.pow((decade - base).clamp(0, 18) as u32))
-}
-
-fn count(decade: i32) -> String {
-    match decade {
-        0..4 => 10u32.pow(decade as u32).to_string(),
-        4..6 => format!("{}k", 10u32.pow(decade as u32 - 3)),
-        _ => format!("{}M", 10u64.pow((decade - 6).clamp(0, 18) as u32)),
-    }
-}
-
-fn times_faster(decade: i32) -> String {
-    10f64.powi(decade).to_string()
 }
 
 /// A coordinate to a tenth.
@@ -471,6 +274,7 @@ pub(super) fn num(v: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::super::metrics::{summarise, tests::row};
+    use super::super::marks::DOTS;
     use super::*;
 
     #[test]
@@ -479,18 +283,26 @@ mod tests {
             .map(|i| row(&format!("s{i}"), "ha-rs", 1e-4 * f64::from(i + 1), i % 40 != 0))
             .collect();
         let groups = summarise(&rows, 1);
-        let plot = times(&groups, &["ha-rs", "sha"], &rows);
-        assert_eq!((plot.axis.low, plot.axis.high), (-4, -1));
-        let panels = plot.panels();
+        let shown = HashMap::from([("s1", 7), ("s399", 9), ("s0", 3)]);
+        let panels = times(&groups, &["ha-rs", "sha"], &rows, &shown).panels();
         assert_eq!((panels.len(), &panels[0].heading[..]), (1, "extreme, parallel"));
         let svg = &panels[0].svg;
         assert!(svg.contains("sha: not applicable") && svg.contains("10 failed"), "{svg}");
         assert!(svg.contains("100 µs") && svg.contains("10 ms") && !svg.contains("NaN"));
         let dots = svg.split("class=\"dots\"").nth(1).unwrap().split('>').next().unwrap();
         assert_eq!(dots.matches("h0").count(), DOTS);
+        // Each dot says which scene of the gallery it is, if it is there.
+        let scenes = |path: &str| -> Vec<String> {
+            let list = path.split("data-scenes=\"").nth(1).unwrap().split('"').next().unwrap();
+            list.split(',').map(str::to_owned).collect()
+        };
+        let of_dots = scenes(dots);
+        assert_eq!((of_dots.len(), &of_dots[0][..], &of_dots[149][..]), (DOTS, "7", "9"));
+        let crosses = svg.split("class=\"failed\"").nth(1).unwrap().split('>').next().unwrap();
+        assert_eq!((scenes(crosses).len(), &scenes(crosses)[0][..]), (10, "3"));
         let speed = speed_ups(&groups, &["ha-rs"]).panels();
         assert!(speed[0].svg.contains("the reference"));
-        assert!(nodes(&groups, &["ha-rs"], &rows).panels()[0].svg.contains("median 10,"));
+        assert!(nodes(&groups, &["ha-rs"], &rows, &shown).panels()[0].svg.contains("median 10,"));
     }
 
     #[test]
@@ -499,31 +311,25 @@ mod tests {
             set: set.to_owned(),
             ..row(&format!("{set}-scene"), method, time, true)
         };
-        let mut rows = vec![
+        let rows = [
             in_set("home", "ha-rs", 0.02),
             in_set("home", "n3p", 0.001),
             in_set("lots", "ha-rs", 0.02),
+            in_set("lots", "n3p", 0.01),
         ];
-        let methods = ["ha-rs", "n3p", "sha"];
-        assert_eq!(home_and_away(&methods, &rows[..2]).len(), 0, "only home");
-        assert_eq!(home_and_away(&["n3p"], &rows).len(), 0, "nothing to compare with");
-        let svg = &home_and_away(&methods, &rows)[0].svg;
-        assert!(svg.contains("n3p: at home 20.00 ×, away no scenes"), "{svg}");
-        rows.push(in_set("lots", "n3p", 0.01));
-        let panels = home_and_away(&methods, &rows);
-        assert_eq!(panels.len(), 1);
-        let svg = &panels[0].svg;
-        assert!(svg.contains("n3p: at home 20.00 ×, away 2.000 ×"), "{svg}");
-        assert!(svg.contains("sha: not applicable") && svg.contains("the reference"), "{svg}");
-        assert!(!svg.contains("NaN"));
-    }
-
-    #[test]
-    fn dots_reach_from_the_least_to_the_greatest() {
-        let values: Vec<f64> = (0..1000).map(f64::from).collect();
-        let picks: Vec<f64> = some(&values).map(|(_, v)| v).collect();
-        assert_eq!((picks.len(), picks[0], picks[DOTS - 1]), (DOTS, 0.0, 999.0));
-        assert_eq!(some(&[3.0]).collect::<Vec<_>>(), [(0, 3.0)]);
-        assert_eq!(some(&[]).count(), 0);
+        assert_eq!(home_and_away(&rows[..2]).len(), 0, "only home");
+        let panels = home_and_away(&rows);
+        let headings: Vec<&str> = panels.iter().map(|p| &p.heading[..]).collect();
+        assert_eq!(headings, ["Speed, all types", "Quality, all types", "Failures, all types"]);
+        assert!(panels[0].svg.contains("n3p: at home 20.00 ×, away 2.000 ×"), "{}", panels[0].svg);
+        assert!(panels[1].svg.contains("n3p: at home 1.000, away 1.000"), "{}", panels[1].svg);
+        assert!(panels[2].svg.contains("n3p: at home 0.0 %, away 0.0 %"), "{}", panels[2].svg);
+        assert!(panels.iter().all(|p| !p.svg.contains("NaN") && p.attributes.is_empty()));
+        let other = Row { kind: Some(ParkingType::Forward), ..in_set("home", "n3p", 0.1) };
+        let rows: Vec<Row> = rows.into_iter().chain([other]).collect();
+        let panels = home_and_away(&rows);
+        // Of forward there is nothing away.
+        assert_eq!(panels.len(), 6);
+        assert_eq!(panels[3].attributes, " data-type=\"parallel\"");
     }
 }

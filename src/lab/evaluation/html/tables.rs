@@ -1,14 +1,17 @@
 //! What the page's template lays out as tables.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use serde::Serialize;
 
-use super::super::metrics::{Group, Interval, Summary, Totals};
-use super::super::quality::{self, Quality};
+use super::super::drives;
+use super::super::metrics::{self, Group, Interval, Summary, Totals};
+use super::super::quality::{self, MethodQuality, Quality};
 use super::super::table::{self, PaperRow, figures, kind_name, numbers, part_name, part_title};
-use super::family;
+use super::filter::{Choices, Setting};
+use super::{escape, family};
 use crate::episode::Row;
+use crate::lab::driving::DriveRow;
 use crate::n3p::Method;
 
 /// Heading (HTML), unit and meaning of a number's column.
@@ -28,6 +31,40 @@ pub const COLUMNS: [Column; 10] = [
     ("N<sub>node</sub>", "", "mean number of node expansions"),
 ];
 
+/// Numbers over all scenes of one choice of the filter.
+#[derive(Serialize)]
+pub struct Slice {
+    /// World, type and level as a list in JSON, each empty for all: what `filter.js` asks for.
+    pub key: String,
+    pub scenes: usize,
+    pub settings: usize,
+    pub episodes: usize,
+    pub failures: usize,
+    pub rejected: usize,
+    pub methods: Vec<MethodLine>,
+    #[serde(skip)]
+    pub quality: Vec<QualityLine>,
+}
+
+/// Every choice of the filter, all scenes first.
+pub fn slices(choices: &Choices, rows: &[Row]) -> Vec<Slice> {
+    let slice = |(setting, rows): (Setting, Vec<Row>)| {
+        let count = |is: fn(&Row) -> bool| rows.iter().filter(|r| is(r)).count();
+        let quality = quality::summarise(&rows);
+        Slice {
+            scenes: rows.iter().map(|r| &r.scene).collect::<HashSet<_>>().len(),
+            settings: quality.groups.len(),
+            episodes: count(Row::applies),
+            failures: count(|r| !r.ok && r.applies()),
+            rejected: count(Row::is_rejected),
+            methods: methods(&metrics::totals(&rows)),
+            quality: quality.all.iter().map(quality_line).collect(),
+            key: setting.key(),
+        }
+    };
+    choices.slices(rows).into_iter().map(slice).collect()
+}
+
 /// A method over all scenes.
 #[derive(Serialize)]
 pub struct MethodLine {
@@ -42,7 +79,7 @@ pub struct MethodLine {
 }
 
 /// One line per method.
-pub fn methods(totals: &[Totals]) -> Vec<MethodLine> {
+fn methods(totals: &[Totals]) -> Vec<MethodLine> {
     let line = |t: &Totals| {
         let counts = [
             (t.rejected, "refused by the independent check"),
@@ -93,6 +130,7 @@ pub struct LevelTable {
 /// The lines of one parking type.
 #[derive(Serialize)]
 pub struct TypeGroup {
+    pub attributes: String,
     pub kind: String,
     pub scenes: usize,
     pub lines: Vec<Line>,
@@ -118,6 +156,7 @@ pub fn levels(groups: &[Group], methods: &[&str]) -> Vec<LevelTable> {
     let of_part = |part: table::Part| {
         let groups = groups.iter().filter(|g| table::is_of(g, part));
         let groups = groups.map(|g| TypeGroup {
+            attributes: Setting::new(&g.set, g.kind, g.level).attributes(),
             kind: kind_name(g.kind),
             scenes: g.summaries.iter().map(|s| s.scenes).max().unwrap_or(0),
             lines: methods.iter().map(|m| line(g, m, &paper)).collect(),
@@ -147,6 +186,7 @@ fn line(group: &Group, method: &str, paper: &[PaperRow]) -> Line {
 /// A line of the table of speed-ups.
 #[derive(Serialize)]
 pub struct SpeedLine {
+    pub attributes: String,
     pub level: String,
     pub kind: String,
     /// Whether a new level or type begins here.
@@ -171,6 +211,7 @@ pub fn speed_ups(groups: &[Group]) -> Vec<SpeedLine> {
             let ratio = s.speed_up.as_ref();
             let saved = ratio.map(|u| 100.0 * (1.0 - 1.0 / u.ratio)).filter(|&s| s >= 0.0);
             lines.push(SpeedLine {
+                attributes: Setting::new(&g.set, g.kind, g.level).attributes(),
                 level: part_name(&g.set, g.level),
                 kind: kind_name(g.kind),
                 first: i == 0,
@@ -205,13 +246,17 @@ pub fn paper_ratio(paper: &[PaperRow], group: &Group, summary: &Summary) -> Opti
     (reference != mine).then(|| mean(reference) / mean(mine))
 }
 
-/// A line of the table of quality.
+/// The methods of one group against the best of the run.
 #[derive(Serialize)]
+pub struct QualityGroup {
+    pub attributes: String,
+    pub heading: String,
+    pub lines: Vec<QualityLine>,
+}
+
+/// A line of the table of quality.
+#[derive(Clone, Serialize)]
 pub struct QualityLine {
-    pub level: String,
-    pub kind: String,
-    /// Whether a new level or type begins here.
-    pub first: bool,
     pub method: String,
     pub family: &'static str,
     pub scenes: usize,
@@ -221,27 +266,73 @@ pub struct QualityLine {
     pub numbers: [String; 6],
 }
 
-/// Every method's paths against the best of the run.
-pub fn quality(found: &Quality) -> Vec<QualityLine> {
-    let mut lines = Vec::new();
-    for (level, kind, methods) in found.parts() {
-        lines.extend(methods.iter().enumerate().map(|(i, m)| QualityLine {
-            level: level.clone(),
-            kind: kind.clone(),
-            first: i == 0,
-            method: m.method.clone(),
-            family: family(&m.method),
-            scenes: m.scenes,
-            failed: m.failed,
-            numbers: quality::numbers(m),
-        }));
+fn quality_line(m: &MethodQuality) -> QualityLine {
+    QualityLine {
+        method: m.method.clone(),
+        family: family(&m.method),
+        scenes: m.scenes,
+        failed: m.failed,
+        numbers: quality::numbers(m),
     }
-    lines
+}
+
+/// Every method's paths against the best of the run, group by group; before them, where there are several, over
+/// all scenes of each choice of the filter.
+pub fn quality(found: &Quality, slices: &[Slice]) -> Vec<QualityGroup> {
+    let all = |(i, slice): (usize, &Slice)| QualityGroup {
+        attributes: format!(
+            " data-slice=\"{}\"{}",
+            escape(&slice.key),
+            if i == 0 { "" } else { " hidden" }
+        ),
+        heading: "all of these".to_owned(),
+        lines: slice.quality.clone(),
+    };
+    let all = slices.iter().enumerate().filter(|_| found.groups.len() > 1).map(all);
+    let group = |g: &quality::QualityGroup| QualityGroup {
+        attributes: Setting::new(&g.set, g.kind, g.level).attributes(),
+        heading: format!("{}, {}", part_name(&g.set, g.level), kind_name(g.kind)),
+        lines: g.methods.iter().map(quality_line).collect(),
+    };
+    all.chain(found.groups.iter().map(group)).collect()
+}
+
+/// A line of the table of drives.
+#[derive(Serialize)]
+pub struct DriveLine {
+    pub attributes: String,
+    /// Whether a new level or type begins here, with this heading.
+    pub heading: Option<String>,
+    pub method: String,
+    pub family: &'static str,
+    /// As [`drives::HEADERS`] has them.
+    pub cells: Vec<String>,
+}
+
+/// What became of the paths that were driven.
+pub fn drives(all: &[DriveRow]) -> Vec<DriveLine> {
+    let mut last = None;
+    let line = |group: drives::Group| {
+        let first = group.first();
+        let setting = Setting::new(&first.set, first.kind, first.level);
+        let heading = format!("{}, {}", part_name(&first.set, first.level), kind_name(first.kind));
+        let is_new = last.as_ref() != Some(&setting);
+        last = Some(setting.clone());
+        DriveLine {
+            attributes: setting.attributes(),
+            heading: is_new.then_some(heading),
+            method: first.method.clone(),
+            family: family(&first.method),
+            cells: group.numbers().to_vec(),
+        }
+    };
+    drives::groups(all).into_iter().map(line).collect()
 }
 
 /// A failure, and where in the gallery it can be seen.
 #[derive(Serialize)]
 pub struct Failure {
+    pub attributes: String,
     pub scene: String,
     pub kind: String,
     pub level: String,
@@ -255,6 +346,7 @@ pub struct Failure {
 pub fn failures(rows: &[Row], scenes: &HashMap<&str, usize>, methods: &[String]) -> Vec<Failure> {
     let failed = rows.iter().filter(|r| !r.ok && r.applies());
     let failure = |row: &Row| Failure {
+        attributes: Setting::new(&row.set, row.kind, row.level).attributes(),
         scene: row.scene.clone(),
         kind: kind_name(row.kind),
         level: part_name(&row.set, row.level),
