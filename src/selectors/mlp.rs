@@ -54,7 +54,9 @@ pub struct MlpHeader {
 
 /// The bytes of a file: the same input gives the same bytes.
 ///
-/// Panics when `weights` are not those of [`LAYERS`].
+/// # Panics
+///
+/// When `weights` are not those of [`LAYERS`].
 pub fn encode(header: &MlpHeader, weights: &[LayerWeights]) -> Vec<u8> {
     let tensors = tensor_file::layer_tensors("", &LAYERS, weights);
     let header = serde_json::to_string(header).expect("a header is plain data");

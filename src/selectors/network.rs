@@ -107,7 +107,9 @@ impl Network {
     /// Lays out the weights of layers of these widths, that of the input first; only the last may be
     /// wider than 256.
     ///
-    /// Panics when the sizes of the weights are others.
+    /// # Panics
+    ///
+    /// When the sizes of the weights are others.
     pub fn new(widths: &[usize], weights: &[LayerWeights]) -> Self {
         assert_eq!(weights.len(), widths.len() - 1, "one set of weights per layer");
         assert!(widths[..widths.len() - 1].iter().all(|w| *w <= WIDEST), "{widths:?}");
@@ -127,6 +129,10 @@ impl Network {
     }
 
     /// [`Network::forward`] into `out`, which has room for every output.
+    ///
+    /// # Panics
+    ///
+    /// When `input` or `out` has another length than the network's.
     pub fn forward_into(&self, input: &[f32], out: &mut [f32]) {
         assert_eq!(input.len(), self.layers[0].inputs, "one value for each input");
         assert_eq!(Some(out.len()), self.layers.last().map(|l| l.outputs), "room for the outputs");

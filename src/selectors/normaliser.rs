@@ -18,7 +18,9 @@ impl Normaliser {
 
     /// Fits means and standard deviations to `rows`, summed in double precision.
     ///
-    /// Panics when `rows` is empty.
+    /// # Panics
+    ///
+    /// When `rows` is empty.
     pub fn fit<const N: usize>(rows: &[[f32; N]]) -> Self {
         assert!(!rows.is_empty(), "a normaliser needs rows");
         let n = rows.len() as f64;

@@ -22,7 +22,11 @@ pub struct NamedTensor {
 }
 
 impl NamedTensor {
-    /// Of single precision. Panics when `values` do not fill `shape`.
+    /// Of single precision.
+    ///
+    /// # Panics
+    ///
+    /// When `values` do not fill `shape`.
     pub fn f32(name: String, shape: Vec<usize>, values: &[f32]) -> Self {
         assert_eq!(values.len(), shape.iter().product::<usize>(), "{name}");
         let bytes = values.iter().flat_map(|v| v.to_le_bytes()).collect();
