@@ -282,6 +282,7 @@ fn geojson() {
             (changed("13.4000", "\"13.4\""), "expected a position"),
             (changed("13.4000, 52.5000", "13.4000"), "expected a position"),
             (changed("13.4000, 52.5000", "392000, 5817000"), "no longitude and latitude"),
+            (changed("13.4000, 52.5000", "103.4000, 52.5000"), "degrees from"),
             (changed("\"Polygon\"", "\"Circle\""), "type is"),
             (changed("\"LineString\"", "\"Polygon\""), "features[1]"),
             (

@@ -103,6 +103,29 @@ fn clouds_of_all_kinds_are_the_same_points() {
         let error = Map::read_with(&fixture(name), &options).unwrap_err().to_string();
         assert!(error.contains("from z = 5 to 6 m"), "{error}");
     }
+    // Some programs name its columns so.
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("columns.pcd");
+    let text = fs::read_to_string(fixture("cloud-ascii.pcd")).unwrap();
+    fs::write(&file, text.replace("FIELDS", "COLUMNS")).unwrap();
+    assert_eq!(Map::read(&file).unwrap().points, all);
+}
+
+/// Map servers take transparency for a fourth colour, so that what is seen through is black: that is told.
+#[test]
+fn transparent_cells_are_told_of() {
+    let folder = TempDir::new().unwrap();
+    let yaml = grid_of(folder.path(), &fixture("lot-transparent.png"), |text| text);
+    let check = |yaml: &Path| {
+        let mut command = Command::cargo_bin("n3p-scene").unwrap();
+        let output = command.arg("check").arg(yaml).output().unwrap();
+        assert!(output.status.success());
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    assert!(check(&yaml).contains("transparent pixels"), "{}", check(&yaml));
+    let yaml =
+        grid_of(folder.path(), &fixture("lot-transparent.png"), |t| t.replace("trinary", "scale"));
+    assert!(!check(&yaml).contains("transparent"), "{}", check(&yaml));
 }
 
 #[test]
