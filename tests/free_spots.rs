@@ -88,7 +88,7 @@ fn score(name: &str, kind: ParkingType, scenes: impl Iterator<Item = Scene>) -> 
 
 fn assert_score(score: &Score, least: f64) {
     assert!(share(score.found, score.scenes) >= least, "{score:?}");
-    assert!(share(score.planned, score.spots) >= 0.95, "{score:?}");
+    assert!(share(score.planned, score.spots) >= 0.9, "{score:?}");
 }
 
 #[test]
