@@ -282,6 +282,7 @@ fn geojson() {
             (changed("13.4000", "\"13.4\""), "expected a position"),
             (changed("13.4000, 52.5000", "13.4000"), "expected a position"),
             (changed("13.4000, 52.5000", "392000, 5817000"), "no longitude and latitude"),
+            (changed("13.4000, 52.5000", "103.4000, 52.5000"), "degrees from"),
             (changed("\"Polygon\"", "\"Circle\""), "type is"),
             (changed("\"LineString\"", "\"Polygon\""), "features[1]"),
             (
@@ -407,6 +408,35 @@ fn opendrive() {
         ],
     );
     survives("xodr", lot.as_bytes());
+    let rows = text("rows.xodr");
+    let changed = |from: &str, to: &str| with(&rows, from, to);
+    refused(
+        "xodr",
+        vec![
+            (changed("s=\"10\" length=\"25\"", "length=\"25\""), "<repeat> in line 11 has no s"),
+            (changed("length=\"25\" dist", "dist"), "has no length"),
+            (changed(" distance=\"2.5\"", ""), "has no distance"),
+            (changed("length=\"25\"", "length=\"-25\""), "length -25"),
+            (changed("length=\"25\"", "length=\"1e300\""), "expected at most 10000"),
+            (changed("length=\"25\"", "length=\"NaN\""), "\"NaN\""),
+            (changed("length=\"25\"", "length=\"\""), "length \"\""),
+            (changed("distance=\"2.5\"", "distance=\"-2.5\""), "distance -2.5"),
+            (changed("distance=\"2.5\"", "distance=\"1e-9\""), "expected at most 10000"),
+            (changed("distance=\"2.5\"", "distance=\"1e-320\""), "expected at most 10000"),
+            (changed("distance=\"2.5\"", "distance=\"two\""), "\"two\""),
+            (changed("tStart=\"-6.5\"", "tStart=\"left\""), "\"left\""),
+            (changed("tEnd=\"-6.5\"", "tEnd=\"inf\""), "\"inf\""),
+            (changed("lengthStart=\"5\"", "lengthStart=\"long\""), "\"long\""),
+            (changed("lengthEnd=\"5\"", "lengthEnd=\"long\""), "\"long\""),
+            (changed("widthStart=\"2.5\"", "widthStart=\"wide\""), "\"wide\""),
+            (changed("widthEnd=\"2.5\"", "widthEnd=\"wide\""), "\"wide\""),
+            (changed("radius=\"0.15\"", "radius=\"thin\""), "\"thin\""),
+            (changed("<cornerLocal u=\"0\" v=\"0\"", "<cornerLocal u=\"0\""), "has no v"),
+            (changed("type=\"railing\"", "type=\"parkingSpace\""), "without a width"),
+            (changed("<cornerRoad s=\"19\"", "<cornerRoad"), "has no s"),
+        ],
+    );
+    survives("xodr", rows.as_bytes());
 }
 
 #[test]

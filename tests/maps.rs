@@ -103,6 +103,29 @@ fn clouds_of_all_kinds_are_the_same_points() {
         let error = Map::read_with(&fixture(name), &options).unwrap_err().to_string();
         assert!(error.contains("from z = 5 to 6 m"), "{error}");
     }
+    // Some programs name its columns so.
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("columns.pcd");
+    let text = fs::read_to_string(fixture("cloud-ascii.pcd")).unwrap();
+    fs::write(&file, text.replace("FIELDS", "COLUMNS")).unwrap();
+    assert_eq!(Map::read(&file).unwrap().points, all);
+}
+
+/// Map servers take transparency for a fourth colour, so that what is seen through is black: that is told.
+#[test]
+fn transparent_cells_are_told_of() {
+    let folder = TempDir::new().unwrap();
+    let yaml = grid_of(folder.path(), &fixture("lot-transparent.png"), |text| text);
+    let check = |yaml: &Path| {
+        let mut command = Command::cargo_bin("n3p-scene").unwrap();
+        let output = command.arg("check").arg(yaml).output().unwrap();
+        assert!(output.status.success());
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    assert!(check(&yaml).contains("transparent pixels"), "{}", check(&yaml));
+    let yaml =
+        grid_of(folder.path(), &fixture("lot-transparent.png"), |t| t.replace("trinary", "scale"));
+    assert!(!check(&yaml).contains("transparent"), "{}", check(&yaml));
 }
 
 #[test]
@@ -225,6 +248,91 @@ fn opendrive_has_spots_and_objects_at_their_road_coordinates() {
         ..MapRequest::default()
     };
     assert_eq!(map.scene(&request).unwrap().all_goals().len(), 4);
+}
+
+/// Objects in rows, along the road, known by what is inside of them, and as other programs write them.
+#[test]
+fn opendrive_rows_stand_where_they_say() {
+    let map = read("rows.xodr");
+    let names: Vec<&str> = map.spots.iter().map(|spot| &spot.name[..]).collect();
+    let count = |name: &str| names.iter().filter(|n| **n == name).count();
+    assert_eq!((count("bay"), count("outlined"), count("3")), (11, 4, 1), "{names:?}");
+    for (i, spot) in map.spots.iter().filter(|spot| spot.name == "bay").enumerate() {
+        let middle = Vec2::new(10.0 + 2.5 * i as f64, -6.5);
+        assert!((spot.middle.position() - middle).norm() < 1e-9, "{spot:?}");
+        assert!((spot.length - 5.0).abs() < 1e-9 && (spot.width - 2.5).abs() < 1e-9, "{spot:?}");
+    }
+    let outlined = map.spots.iter().filter(|spot| spot.name == "outlined");
+    for (i, spot) in outlined.enumerate() {
+        let middle = Vec2::new(0.05 + 2.55 * i as f64 + 1.25, 6.5);
+        assert!((spot.middle.position() - middle).norm() < 1e-9, "{spot:?}");
+    }
+    let polygons = polygons(&map);
+    let inside = |x: f64, y: f64| polygons.iter().any(|polygon| polygon.contains(Vec2::new(x, y)));
+    for x in [20.0, 30.0, 40.0, 50.0] {
+        assert!(inside(x, 5.5) && inside(x + 0.149, 5.5) && !inside(x + 0.2, 5.5), "pole at {x}");
+    }
+    assert!(!inside(8.0, 5.5), "where a repeated object says it is itself, there is none");
+    // The wall, 30 cm thick, from 9.5 m beside the road to 10.5 m.
+    for x in [0.1, 20.0, 37.3, 59.9] {
+        let middle = -9.5 - x / 60.0;
+        assert!(inside(x, middle + 0.14) && inside(x, middle - 0.14), "wall at {x}");
+        assert!(!inside(x, middle + 0.16) && !inside(x, middle - 0.16), "wall at {x}");
+    }
+    for (s, t) in [(40.0, 10.0), (44.0, 12.0)] {
+        assert!(inside(s + 0.9, t + 0.4) && inside(s - 0.9, t - 0.4) && !inside(s, t + 0.6));
+    }
+    // A railing without a width, 9 m left of an arc of 50 m radius.
+    let [railing, fence] = &map.polylines[..] else { panic!("two lines") };
+    assert!(railing.len() > 50 && fence.len() == 3, "{} {}", railing.len(), fence.len());
+    for &[x, y] in railing {
+        assert!(((x - 60.0).hypot(y - 50.0) - 41.0).abs() < 1e-9);
+    }
+    assert_eq!(map.points, [[5.0, 33.0]]);
+    assert_eq!(map.low.obstacles.len(), 0);
+}
+
+/// What stands still is in the way, whatever it is called.
+#[test]
+fn commonroad_buildings_are_obstacles() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("a.xml");
+    let text = fs::read_to_string(fixture("lot-2020a.xml")).unwrap();
+    let building = r#"<environmentObstacle id="900"><type>building</type><shape><polygon>
+        <point><x>-10</x><y>10</y></point><point><x>10</x><y>10</y></point><point><x>10</x><y>12</y></point>
+        </polygon></shape></environmentObstacle><planningProblem "#;
+    fs::write(&file, text.replacen("<planningProblem ", building, 1)).unwrap();
+    let map = Map::read(&file).unwrap();
+    assert_eq!(map.obstacles.len(), 5);
+    assert!(polygons(&map)[4].contains(Vec2::new(9.0, 11.5)));
+    // A goal that is a polygon says by its shape which way to stand.
+    let from = text.find("<goalState>").unwrap();
+    let to = text.find("</goalState>").unwrap();
+    let corner = |x: f64, y: f64| format!("<point><x>{x}</x><y>{y}</y></point>");
+    let corners = [(-0.3, -0.6), (0.3, -0.6), (0.3, 0.6), (-0.3, 0.6)].map(|(x, y)| corner(x, y));
+    let goal = format!("<goalState><position><polygon>{}</polygon></position>", corners.concat());
+    fs::write(&file, format!("{}{goal}{}", &text[..from], &text[to..])).unwrap();
+    let map = Map::read(&file).unwrap();
+    let headings: Vec<f64> = map
+        .goals
+        .iter()
+        .map(|goal| match goal {
+            Place::Middle(pose) | Place::RearAxle(pose) => pose.heading.abs(),
+        })
+        .collect();
+    assert_eq!(headings.len(), 2);
+    assert!(
+        headings.iter().all(|h| (h - std::f64::consts::FRAC_PI_2).abs() < 1e-9),
+        "{headings:?}"
+    );
+}
+
+/// Of an extract of OpenStreetMap roads and the car park's own area are no obstacles.
+#[test]
+fn tags_of_openstreetmap_say_what_is_in_the_way() {
+    let map = read("street.geojson");
+    assert_eq!((map.spots.len(), map.obstacles.len(), map.polylines.len()), (2, 1, 1));
+    assert_eq!((map.points.len(), map.low.polylines.len()), (1, 1));
 }
 
 fn n3p_plan(arguments: &[&str]) -> (Option<i32>, String) {

@@ -12,6 +12,7 @@ use crate::geometry::{Polygon, Pose, Vec2};
 use crate::output::drawing::{Drawing, scene_svg};
 use crate::planners::{Problem, ProblemError};
 use crate::vehicle::Vehicle;
+use crate::world::free_spots::SpotKind;
 use crate::world::maps::Spot;
 use crate::world::{Map, MapRequest, Scene};
 
@@ -26,6 +27,9 @@ pub struct Written {
     out: PathBuf,
     #[command(flatten)]
     args: MapArgs,
+    /// Mark the places where the vehicle may park, found between what stands there, instead of marked ones.
+    #[arg(long)]
+    find_spots: bool,
 }
 
 /// Maps to look at.
@@ -41,14 +45,18 @@ pub struct Checked {
     json: bool,
 }
 
-/// A map with parking spaces.
+/// A map to park in.
 #[derive(clap::Args)]
 pub struct Listed {
-    /// The map, which marks parking spaces: OpenDRIVE, or GeoJSON with the role "spot".
+    /// The map. Where it marks no parking spaces (OpenDRIVE, or GeoJSON with the role "spot"), they are looked for
+    /// between what stands there.
     #[arg(value_name = "FILE")]
     map: PathBuf,
     #[command(flatten)]
     args: MapArgs,
+    /// Look for places between what stands there also where spots are marked.
+    #[arg(long)]
+    find: bool,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -60,6 +68,10 @@ impl Written {
         let mut map = self.args.read(&self.map)?;
         let request = self.args.request()?;
         map.add(&request);
+        if self.find_spots {
+            let found = map.free_spots(&vehicle(&map)?).or_bad_input()?;
+            map.spots = found.into_iter().map(|free| free.spot).collect();
+        }
         Ok(map)
     }
 
@@ -202,37 +214,50 @@ fn places(scene: &Scene) -> Result<usize> {
 }
 
 impl Listed {
-    /// Prints the parking spaces of a map, with the poses of a car in them.
+    /// Prints the parking spaces of a map, marked or found, with the poses of a car in them.
     pub fn list(&self) -> Result<ExitCode> {
-        let map = self.args.read(&self.map)?;
-        let request = self.args.request()?;
-        let vehicle = request.vehicle.or(map.vehicle).ok_or_else(|| {
-            BadInput("--vehicle: is missing; spots are free for a vehicle".to_owned())
-        })?;
+        let mut map = self.args.read(&self.map)?;
+        map.add(&self.args.request()?);
+        let vehicle = vehicle(&map)?;
+        let is_found = self.find || map.spots.is_empty();
+        let all: Vec<(Option<SpotKind>, Spot)> = if is_found {
+            let found = map.free_spots(&vehicle).or_bad_input()?.into_iter();
+            found.map(|free| (Some(free.kind), free.spot)).collect()
+        } else {
+            map.spots.iter().map(|spot| (None, spot.clone())).collect()
+        };
         let mut spots = Vec::new();
-        for spot in &map.spots {
-            spots.push((spot, free_goals(&map, spot, &vehicle)?));
+        for (kind, spot) in &all {
+            spots.push((kind, spot, free_goals(&map, spot, &vehicle)?));
         }
         if self.json {
-            let spots = spots.iter().map(|(spot, goals)| {
+            let spots = spots.iter().map(|(kind, spot, goals)| {
                 json!({
-                    "name": spot.name, "middle": spot.middle, "length_m": spot.length,
+                    "name": spot.name, "type": kind, "middle": spot.middle, "length_m": spot.length,
                     "width_m": spot.width, "goals": goals,
                 })
             });
             print(json!({ "spots": spots.collect::<Vec<_>>() }))?;
             return Ok(ExitCode::SUCCESS);
         }
-        let free = spots.iter().filter(|(_, goals)| !goals.is_empty());
-        let mut lines: Vec<String> = free.map(|(spot, goals)| line(spot, goals)).collect();
-        let (all, free) = (spots.len(), lines.len());
-        lines.push(format!(
-            "{}: {free} of {all} spots are free for the vehicle",
-            self.map.display()
-        ));
+        let free = spots.iter().filter(|(_, _, goals)| !goals.is_empty());
+        let mut lines: Vec<String> = free.map(|(_, spot, goals)| line(spot, goals)).collect();
+        let (all, free, map) = (spots.len(), lines.len(), self.map.display());
+        lines.push(if is_found {
+            format!("{map}: {free} free spots found for the vehicle")
+        } else {
+            format!("{map}: {free} of {all} spots are free for the vehicle")
+        });
         print(lines.join("\n"))?;
         Ok(ExitCode::SUCCESS)
     }
+}
+
+/// The vehicle for which spots are free.
+fn vehicle(map: &Map) -> Result<Vehicle> {
+    let missing =
+        || BadInput("--vehicle: is missing; spots are free for a vehicle".to_owned()).into();
+    map.vehicle.ok_or_else(missing)
 }
 
 fn line(spot: &Spot, goals: &[Pose]) -> String {

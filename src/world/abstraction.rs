@@ -411,7 +411,7 @@ impl<'a> Near<'a> {
 }
 
 /// The part of `a`–`b` with `low ≤ coordinate ≤ high` on one axis (0 is x, 1 is y).
-fn clip(a: Vec2, b: Vec2, axis: usize, low: f64, high: f64) -> Option<(Vec2, Vec2)> {
+pub(super) fn clip(a: Vec2, b: Vec2, axis: usize, low: f64, high: f64) -> Option<(Vec2, Vec2)> {
     let (pa, pb) = (a[axis], b[axis]);
     if (pa < low && pb < low) || (pa > high && pb > high) {
         return None;

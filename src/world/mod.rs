@@ -4,7 +4,7 @@
 //! paths may end, [`mod@tpcap`] a benchmark's, [`maps`] what else people have, `generate` makes scenes, `lots` whole car parks, `bays`
 //! unusual spots, `clutter` what is no parking lot); [`spot`] finds the spot frame that everything below works in; [`Obstacles`] is a scene's geometry in any frame; [`collision`] answers
 //! whether a motion is free; [`cell`] defines the abstracted environments 𝓔 of the paper and
-//! [`abstraction`] finds them in a scene.
+//! [`abstraction`] finds them in a scene; [`free_spots`] finds places to park in where nothing marks them.
 
 pub mod abstraction;
 #[cfg(any(test, feature = "generate"))]
@@ -14,6 +14,7 @@ pub mod cell;
 #[cfg(any(test, feature = "generate"))]
 pub mod clutter;
 pub mod collision;
+pub mod free_spots;
 #[cfg(any(test, feature = "generate"))]
 pub mod generate;
 pub mod goals;

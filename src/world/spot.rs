@@ -134,12 +134,11 @@ fn grid(scene: &Scene) -> Grid {
 
 /// The least that still is a spot beside a lane: the car stands in it and passes through it, and the
 /// lane may end beside the spot.
-fn least_grid(scene: &Scene, kind: ParkingType) -> Grid {
-    /// Room on each side of the parked car, that in the lane beside it, and how far the lane
-    /// reaches back, metres for the default vehicle.
+/// It reaches `back` so far, metres for the default vehicle.
+fn least_grid(scene: &Scene, kind: ParkingType, back: f64) -> Grid {
+    /// Room on each side of the parked car, and that in the lane beside it, metres for the default vehicle.
     const ROOM: f64 = 0.02;
     const LANE_ROOM: f64 = 1.0;
-    const BACK: f64 = 5.0;
     let vehicle = &scene.vehicle;
     let scale = vehicle.scale();
     let usual = grid(scene);
@@ -150,10 +149,15 @@ fn least_grid(scene: &Scene, kind: ParkingType) -> Grid {
         bay_spot_width: from(along, usual.bay_spot_width),
         parallel_spot_width: from(along, usual.parallel_spot_width),
         dead_end: from(along / 2.0, usual.dead_end),
-        back: BACK * scale,
+        back: back * scale,
         ..usual
     }
 }
+
+/// How far the least lane beside a goal reaches back, metres for the default vehicle.
+const BACK: f64 = 5.0;
+/// The same beside a place that nobody says is one: more than most lanes are wide, across which nobody parks.
+const FAR_BACK: f64 = 9.0;
 
 /// The goal's own frame, mirrored where the car would start to its right.
 fn goal_frame(scene: &Scene) -> Frame {
@@ -187,18 +191,49 @@ enum Demand {
 /// lane is large. Where there is a usual one, others do not count. An angled one counts where none is
 /// usual, and any other's lane is clearly smaller.
 fn found(scene: &Scene, kinds: &[ParkingType], precision: Precision) -> Option<Found> {
+    beside_lane(scene, kinds, precision, BACK)
+}
+
+/// The same, where the least lane reaches `back` so far.
+fn beside_lane(
+    scene: &Scene,
+    kinds: &[ParkingType],
+    precision: Precision,
+    back: f64,
+) -> Option<Found> {
     let near = around_goal(scene, precision);
-    let likeliest = |demand| likeliest(scene, &near, kinds, demand);
+    let likeliest = |demand| likeliest(scene, &near, kinds, demand, back);
     if let Some(usual) = likeliest(Demand::Usual) {
         return Some(usual);
     }
     let square = likeliest(Demand::FartherOut).or_else(|| likeliest(Demand::Least));
     let may_be_angled = kinds.contains(&ParkingType::Angled);
-    let angled = may_be_angled.then(|| angled::found(scene, &near)).flatten();
+    let angled = may_be_angled.then(|| angled::found(scene, &near, back)).flatten();
     match (square, angled) {
         (Some(square), Some(angled)) if angled.size > CLEARLY * square.size => Some(angled),
         (square, angled) => square.or(angled),
     }
+}
+
+/// A lane beside a place that nobody says is a spot.
+pub(super) struct LaneBeside {
+    /// How the car stands beside it.
+    pub stance: Stance,
+    /// Its area.
+    pub size: f64,
+    /// Whether it is as wide and as long as usual ones.
+    pub is_usual: bool,
+}
+
+/// The lane beside a scene's goal, wherever the car starts, for a spot of one of `kinds`.
+pub(super) fn lane_beside(scene: &Scene, kinds: &[ParkingType]) -> Option<LaneBeside> {
+    let Found { stance, size, .. } = beside_lane(scene, kinds, Precision::Given, FAR_BACK)?;
+    let near = around_goal(scene, Precision::Given);
+    let demands = [Demand::Usual, Demand::FartherOut];
+    let has_usual =
+        || demands.iter().any(|&d| likeliest(scene, &near, kinds, d, FAR_BACK).is_some());
+    let is_usual = stance.kind() != ParkingType::Angled && has_usual();
+    Some(LaneBeside { stance, size, is_usual })
 }
 
 /// An angled bay's lane must be so many times as large as that of an unusual square spot to count.
@@ -210,9 +245,11 @@ fn likeliest(
     near: &Surroundings,
     kinds: &[ParkingType],
     demand: Demand,
+    back: f64,
 ) -> Option<Found> {
     let of_kind = |&kind: &ParkingType| {
-        let grid = if demand == Demand::Least { least_grid(scene, kind) } else { grid(scene) };
+        let grid =
+            if demand == Demand::Least { least_grid(scene, kind, back) } else { grid(scene) };
         let stance = Stance::new(kind, 0.0);
         let usual = spot_frame(scene, stance);
         // The car may come from the other side, or stand across the lane.

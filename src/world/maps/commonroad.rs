@@ -1,4 +1,4 @@
-//! CommonRoad scenarios, versions 2018b and 2020a: static obstacles and the first planning problem.
+//! CommonRoad scenarios, versions 2018b and 2020a: what stands still and the first planning problem.
 //!
 //! Positions are those of the middle of a vehicle's body. A goal region becomes its middle, and the tolerance that fits into
 //! it. What moves is left out with a warning. Format: commonroad.in.tum.de, "XML scenario format".
@@ -8,7 +8,7 @@ use std::f64::consts::{PI, TAU};
 use roxmltree::Document;
 
 use super::xml::{Element, child, children, field, finite};
-use super::{Map, MapFile, MapOptions, Place};
+use super::{Map, MapFile, MapOptions, Place, Spot};
 use crate::geometry::Polygon;
 use crate::geometry::{Pose, Vec2, distance_to_segment, wrap_angle};
 use crate::world::GoalTolerance;
@@ -35,10 +35,25 @@ pub(super) fn read(
         let heading = reader.exact(state, "orientation")?;
         reader.outlines(shape, Pose::new(x, y, heading), &mut map.obstacles)?;
     }
-    let moving =
-        children(root, "dynamicObstacle").count() + all().filter(|o| !is_static(o)).count();
+    // Buildings and the like have their place in their shape.
+    for obstacle in children(root, "environmentObstacle") {
+        let shape = reader.child(obstacle, "shape")?;
+        reader.outlines(shape, Pose::default(), &mut map.obstacles)?;
+    }
+    let moving = ["dynamicObstacle", "phantomObstacle"]
+        .map(|name| children(root, name).count())
+        .into_iter()
+        .sum::<usize>()
+        + all().filter(|o| !is_static(o)).count();
     if moving > 0 {
         tracing::warn!("{}: {moving} moving obstacles are left out", file.path.display());
+    }
+    let lanelets = children(root, "lanelet").count();
+    if lanelets > 0 && !options.borders && map.obstacles.is_empty() {
+        tracing::info!(
+            "{}: nothing stands beside its {lanelets} lanelets; take their borders for walls with --borders",
+            file.path.display()
+        );
     }
     if options.borders {
         for lanelet in children(root, "lanelet") {
@@ -60,6 +75,9 @@ pub(super) fn read(
     }
     Ok(map)
 }
+
+/// A region so many times as long as wide has a direction of its own.
+const LONG: f64 = 1.2;
 
 struct Reader<'a> {
     file: MapFile<'a>,
@@ -191,8 +209,13 @@ impl Reader<'_> {
             heading_rad: GoalTolerance::MAX_HEADING,
         };
         for goal in children(problem, "goalState") {
-            // A goal without a place of its own says only when or how fast.
-            let Some(position) = child(goal, "position") else { continue };
+            let Some(position) = child(goal, "position") else {
+                tracing::warn!(
+                    "{}: a goal without a position is left out: it says only when to arrive or how fast",
+                    self.file.path.display()
+                );
+                continue;
+            };
             let regions = self.regions(position)?;
             let (middle, half) = match child(goal, "orientation") {
                 None => (None, GoalTolerance::MAX_HEADING),
@@ -210,7 +233,7 @@ impl Reader<'_> {
                 let headings = match (middle, heading) {
                     (Some(middle), _) => vec![middle],
                     (None, Some(along)) => vec![along, wrap_angle(along + PI)],
-                    (None, None) => vec![0.0, PI],
+                    (None, None) => vec![0.0, PI, PI / 2.0, -PI / 2.0],
                 };
                 map.goals.extend(headings.into_iter().map(|h| Place::Middle(Pose::new(x, y, h))));
                 tolerance.position_m = tolerance.position_m.min(radius);
@@ -252,7 +275,7 @@ impl Reader<'_> {
         Ok(regions)
     }
 
-    /// The largest disc around the middle of a polygon's corners that is inside.
+    /// The largest disc around the middle of a polygon's corners that is inside; along it, where it is clearly longer than wide.
     fn around(&self, shape: Element) -> Result<Region, SceneError> {
         let points = self.polygon(shape)?;
         let corners: Vec<Vec2> = points.iter().map(|&[x, y]| Vec2::new(x, y)).collect();
@@ -265,11 +288,11 @@ impl Reader<'_> {
             return Err(self.file.invalid(field(shape), text));
         }
         let away = polygon.edges().map(|(a, b)| distance_to_segment(middle, a, b));
-        Ok(Region {
-            middle: middle.into(),
-            radius: away.fold(f64::INFINITY, f64::min),
-            heading: None,
-        })
+        let radius = away.fold(f64::INFINITY, f64::min);
+        let around = Spot::around("", &points);
+        let is_long = around.length > LONG * around.width;
+        let heading = is_long.then_some(around.middle.heading);
+        Ok(Region { middle: middle.into(), radius, heading })
     }
 }
 

@@ -93,6 +93,11 @@ impl Geographic {
         [RECTIFYING * eta, RECTIFYING * (xi - origin)]
     }
 
+    /// How far `[longitude, latitude]` is from here, degrees of the one or of the other.
+    pub(super) fn degrees_from(self, [longitude, latitude]: [f64; 2]) -> f64 {
+        turn(longitude - self.longitude).abs().max((latitude - self.latitude).abs())
+    }
+
     /// Metres east and north, as `[longitude, latitude]` in degrees.
     pub fn to_wgs84(self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [origin, _] = mercator(0.0, self.latitude);

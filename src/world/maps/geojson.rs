@@ -72,7 +72,7 @@ enum Role {
     Spot,
     Start,
     Goal,
-    /// Of a plan that was written: nothing to avoid.
+    /// Of a plan that was written, or what cars drive on: nothing to avoid.
     Path,
 }
 
@@ -124,11 +124,23 @@ impl Geometry<'_> {
                 );
                 return Err(file.invalid(format!("{field}.coordinates"), text));
             }
+            // The middle meridian of the projection is that of the origin.
+            let apart = origin.degrees_from(*vertex);
+            if apart > FARTHEST {
+                let text = format!(
+                    "= {vertex:?} is {apart:.0} degrees from {:?}, the origin; expected a place within {FARTHEST}",
+                    [origin.longitude, origin.latitude]
+                );
+                return Err(file.invalid(format!("{field}.coordinates"), text));
+            }
             *vertex = origin.to_local(*vertex);
         }
         Ok(())
     }
 }
+
+/// Farther from its origin than so many degrees a map is no place to park in, and its metres are none.
+const FARTHEST: f64 = 5.0;
 
 /// The middle of everything, degrees.
 fn middle(geometries: &[Geometry], file: MapFile) -> Result<Geographic, SceneError> {
@@ -277,12 +289,9 @@ impl Reader<'_> {
         field: &str,
     ) -> Result<Role, SceneError> {
         let Some(properties) = properties else { return Ok(Role::Obstacle) };
-        if properties.get("amenity").is_some_and(|value| value == "parking_space") {
-            return Ok(Role::Spot);
-        }
         let Some(key) = ["role", "kind"].into_iter().find(|&key| properties.contains_key(key))
         else {
-            return Ok(Role::Obstacle);
+            return Ok(of_tags(properties));
         };
         let name = properties[key].as_str();
         let role = Role::NAMES.iter().find(|(known, _)| Some(*known) == name);
@@ -420,6 +429,21 @@ impl Reader<'_> {
             }
         }
         Ok(())
+    }
+}
+
+/// What a feature of OpenStreetMap is, whose tags are properties; anything that is not known is in the way.
+fn of_tags(tags: &Members<String, Value>) -> Role {
+    /// What says where cars drive, or of whole areas what they are for.
+    const GROUND: [&str; 5] = ["boundary", "highway", "landuse", "place", "route"];
+    let is = |key: &str, value: &str| tags.get(key).is_some_and(|given| given == value);
+    let has = |key: &&str| tags.contains_key(*key);
+    match () {
+        () if is("amenity", "parking_space") => Role::Spot,
+        () if is("barrier", "kerb") => Role::Low,
+        () if ["barrier", "building"].iter().any(has) => Role::Obstacle,
+        () if is("amenity", "parking") || GROUND.iter().any(has) => Role::Path,
+        () => Role::Obstacle,
     }
 }
 

@@ -5,6 +5,7 @@
 //! As navigation takes such a map by default, a cell is in the way where it is certain to be occupied (100 %).
 //! What lies beyond the image is not to be driven on: the image is the drivable area.
 
+use std::cell::Cell;
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -77,7 +78,19 @@ pub(super) fn read(text: &str, options: &MapOptions, file: MapFile) -> Result<Ma
     let bytes = (file.bytes)(&at).map_err(|e| {
         unusable(format!("cannot be read: {}; expected a PGM or PNG file", reason(&e)))
     })?;
-    let cells = Cells::read(bytes, |pixel| rule.is_blocked(pixel)).map_err(unusable)?;
+    let is_seen_through = Cell::new(false);
+    let is_blocked = |pixel: Pixel| {
+        let is_blocked = rule.is_blocked(pixel);
+        is_seen_through.set(is_seen_through.get() || (is_blocked && pixel.opacity == 0.0));
+        is_blocked
+    };
+    let cells = Cells::read(bytes, is_blocked).map_err(unusable)?;
+    if is_seen_through.get() {
+        tracing::warn!(
+            "{}: transparent pixels of {image} count as occupied, as map servers take them; with mode: scale they are unknown",
+            file.path.display()
+        );
+    }
     Ok(map(&cells, origin, resolution, image))
 }
 

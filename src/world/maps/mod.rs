@@ -29,6 +29,7 @@ use std::{fs, io};
 pub use geographic::Geographic;
 pub(crate) use geojson_file::{collection, feature, line_string, point};
 
+use super::free_spots::{FreeSpot, free_spots};
 use super::goals::GoalTolerance;
 use super::scene::{SceneError, stem};
 use super::scene_file::parse_json;
@@ -273,6 +274,18 @@ impl Map {
             tracing::warn!("{}: {warning}", self.path.display());
         }
         Ok(scene)
+    }
+
+    /// Places where a vehicle may park, found between what stands there, whether spots are marked or not.
+    pub fn free_spots(&self, vehicle: &Vehicle) -> Result<Vec<FreeSpot>, SceneError> {
+        let Some([x0, y0, x1, y1]) = self.extent() else { return Ok(Vec::new()) };
+        let middle = Pose::new(f64::midpoint(x0, x1), f64::midpoint(y0, y1), 0.0);
+        let vehicle = Some(*vehicle);
+        let scene = self.scene(&MapRequest { start: Some(middle), goals: vec![middle], vehicle })?;
+        free_spots(&scene).map_err(|e| SceneError::Format {
+            path: self.path.clone(),
+            message: e.to_string(),
+        })
     }
 
     /// Puts what is asked for into the map.

@@ -149,6 +149,8 @@ fn head_of<'a>(bytes: &'a [u8], file: MapFile) -> Result<(Head<'a>, usize), Scen
             Some(word) if word.starts_with('#') => {}
             Some("DATA") => break words.next().unwrap_or_default(),
             Some(key) => {
+                // Some programs name its columns.
+                let key = if key == "COLUMNS" { "FIELDS" } else { key };
                 lists.insert(key, words.collect::<Vec<_>>());
             }
         }

@@ -28,10 +28,11 @@ const BESIDE: f64 = 1.5;
 /// Half the width of what must be free of the way out, of the car's width.
 const WAY_OUT: f64 = 0.4;
 
-/// An angled bay around the goal; what is `near` as `super::around_goal` has it.
-pub(super) fn found(scene: &Scene, near: &Surroundings) -> Option<Found> {
+/// An angled bay around the goal; what is `near` as `super::around_goal` has it, how far the lane reaches `back` at least as
+/// `super::least_grid`.
+pub(super) fn found(scene: &Scene, near: &Surroundings, back: f64) -> Option<Found> {
     let slant_deg = Axis { min: LEAST, max: 180.0 - LEAST, step: FINER[1] };
-    let full = Grid { slant_deg, ..least_grid(scene, ParkingType::Angled) };
+    let full = Grid { slant_deg, ..least_grid(scene, ParkingType::Angled, back) };
     let Axis { min, max, .. } = full.dead_end;
     // A few lengths are enough to tell lanes apart.
     let coarse = Grid { dead_end: Axis { step: (max - min) / LENGTHS, ..full.dead_end }, ..full };
