@@ -267,6 +267,11 @@ typedef struct n3p_margins {
      * On its right.
      */
     double right;
+    /**
+     * Around its mirrors: what of the contour stands out farther to either side than the body does at
+     * the rear axle; 0 for the sides'.
+     */
+    double mirrors;
 } n3p_margins;
 
 /**

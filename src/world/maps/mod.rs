@@ -281,11 +281,10 @@ impl Map {
         let Some([x0, y0, x1, y1]) = self.extent() else { return Ok(Vec::new()) };
         let middle = Pose::new(f64::midpoint(x0, x1), f64::midpoint(y0, y1), 0.0);
         let vehicle = Some(*vehicle);
-        let scene = self.scene(&MapRequest { start: Some(middle), goals: vec![middle], vehicle })?;
-        free_spots(&scene).map_err(|e| SceneError::Format {
-            path: self.path.clone(),
-            message: e.to_string(),
-        })
+        let scene =
+            self.scene(&MapRequest { start: Some(middle), goals: vec![middle], vehicle })?;
+        free_spots(&scene)
+            .map_err(|e| SceneError::Format { path: self.path.clone(), message: e.to_string() })
     }
 
     /// Puts what is asked for into the map.

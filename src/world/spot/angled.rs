@@ -7,7 +7,8 @@
 
 use std::f64::consts::PI;
 
-use super::{Demand, Found, grid, is_along, least_grid, merit, other_way, spot_frame, widest};
+use super::beside_lane::{Demand, Found, is_along, least_grid, merit, widest};
+use super::{grid, other_way, spot_frame};
 use crate::geometry::{Frame, Vec2, signed_angle};
 use crate::world::abstraction::Surroundings;
 use crate::world::cell::{Axis, Grid};
@@ -29,7 +30,7 @@ const BESIDE: f64 = 1.5;
 const WAY_OUT: f64 = 0.4;
 
 /// An angled bay around the goal; what is `near` as `super::around_goal` has it, how far the lane reaches `back` at least as
-/// `super::least_grid`.
+/// [`least_grid`].
 pub(super) fn found(scene: &Scene, near: &Surroundings, back: f64) -> Option<Found> {
     let slant_deg = Axis { min: LEAST, max: 180.0 - LEAST, step: FINER[1] };
     let full = Grid { slant_deg, ..least_grid(scene, ParkingType::Angled, back) };
