@@ -21,7 +21,7 @@ const SEED: u64 = 31;
 
 /// Scenes of each type and level.
 fn count() -> u64 {
-    std::env::var("COUNT").ok().and_then(|count| count.parse().ok()).unwrap_or(12)
+    std::env::var("COUNT").ok().and_then(|count| count.parse().ok()).unwrap_or(6)
 }
 
 fn kind_of(kind: ParkingType) -> SpotKind {

@@ -14,6 +14,9 @@ const PAGE: usize = 64;
 
 /// No tile, or no cost yet.
 const NONE: u32 = u32::MAX;
+/// Costs that are kept allocated from one search to the next: 64 MB. A search that went everywhere in fine steps
+/// may have taken gigabytes.
+const KEPT: usize = 16 << 20;
 
 /// The cheapest cost-to-come found for every lattice state.
 #[derive(Debug, Default)]
@@ -50,6 +53,7 @@ impl Lattice {
         self.page_of.resize(self.pages_x * self.size.1.div_ceil(PAGE * TILE), NONE);
         self.tile_of.clear();
         self.costs.clear();
+        self.costs.shrink_to(KEPT);
     }
 
     /// The state of a pose; `None` outside the domain. Allocates its tile.
@@ -115,6 +119,21 @@ mod tests {
         l.reset(&Aabb::new(-10.0, -10.0, 10.0, 10.0), 0.5, 72);
         let again = at(&mut l, 0.1, 0.1, 0.0).unwrap();
         assert_eq!(l.cost(again), f32::INFINITY);
+    }
+
+    #[test]
+    fn what_one_search_took_is_not_kept_for_ever() {
+        let mut l = Lattice::default();
+        let domain = Aabb::new(0.0, 0.0, 40.0, 40.0);
+        l.reset(&domain, 0.05, 1440);
+        for x in 0..80 {
+            l.state(Pose::new(0.45 * f64::from(x) + 0.01, 20.0, 0.0));
+            l.state(Pose::new(0.45 * f64::from(x) + 0.01, 30.0, 0.0));
+            l.state(Pose::new(0.45 * f64::from(x) + 0.01, 35.0, 0.0));
+        }
+        assert!(l.costs.len() > KEPT, "{}", l.costs.len());
+        l.reset(&domain, 0.05, 1440);
+        assert!(l.costs.capacity() <= KEPT, "{}", l.costs.capacity());
     }
 
     #[test]

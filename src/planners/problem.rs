@@ -188,6 +188,10 @@ impl Problem {
     /// radians.
     pub(super) const ROUNDING: f64 = 1e-6;
 
+    /// Most of what is checked lies within so much of start and goal, metres for the default vehicle: where searches go
+    /// first, and the car there.
+    const ABOUT: f64 = 16.0;
+
     /// The largest margin that can be asked for, metres.
     pub const MAX_MARGIN: f64 = 1.0;
 
@@ -371,6 +375,8 @@ impl Problem {
             return Err(ProblemError::GoalInCollision(goal.into(), Conflict::Unknown));
         }
         let margin = sides.at_most(margin).least();
+        let about = Aabb::around([start, goal].map(|pose| pose.position()));
+        let collision = collision.focused_on(about.inflated(Self::ABOUT * vehicle.scale()));
         Ok(Problem {
             vehicle,
             frame,

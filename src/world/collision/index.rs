@@ -3,7 +3,8 @@
 //! Edges are grouped into clusters of a few that lie together (a polygon's own edges, or
 //! neighbouring points), each with a box. A query tests the boxes one after the other:
 //! for the tens to hundreds of clusters of a parking scene this beats a tree. The clusters of
-//! whole maps lie in a tree of boxes.
+//! whole maps lie in a tree of boxes; those about where the car is to drive are kept apart besides, so that most queries
+//! cost no more than in a small scene.
 
 use std::ops::Range;
 
@@ -45,12 +46,25 @@ struct Clusters {
     all: Vec<Cluster>,
     /// Boxes around [`FAN`] boxes each, of the clusters first, up to a level with a few.
     levels: Vec<Vec<Aabb>>,
+    focus: Option<Box<Focus>>,
+}
+
+/// The clusters of many that touch an area.
+#[derive(Clone, Debug)]
+struct Focus {
+    area: Aabb,
+    clusters: Clusters,
 }
 
 impl Clusters {
-    fn new(mut all: Vec<Cluster>) -> Self {
+    fn new(all: Vec<Cluster>) -> Self {
+        Self::in_a_tree_above(FEW, all)
+    }
+
+    /// A tree where there are more than `few`.
+    fn in_a_tree_above(few: usize, mut all: Vec<Cluster>) -> Self {
         let mut levels: Vec<Vec<Aabb>> = Vec::new();
-        if all.len() > FEW {
+        if all.len() > few {
             along_a_curve(&mut all, |c| (c.aabb.min + c.aabb.max) * 0.5);
             let mut below: Vec<Aabb> = all.iter().map(|c| c.aabb).collect();
             while below.len() > FAN {
@@ -61,16 +75,39 @@ impl Clusters {
                 below = level;
             }
         }
-        Self { all, levels }
+        Self { all, levels, focus: None }
+    }
+
+    /// Keeps what touches `area` apart, where there is much else.
+    fn focus(&mut self, area: Aabb) {
+        if self.levels.is_empty() {
+            return;
+        }
+        let mut near = Vec::new();
+        self.find(&area, |cluster| {
+            near.push(*cluster);
+            None::<()>
+        });
+        self.focus = Some(Box::new(Focus { area, clusters: Self::in_a_tree_above(FEW / 8, near) }));
+    }
+
+    /// The clusters among which all lie that touch `near`.
+    #[inline]
+    fn about(&self, near: &Aabb) -> &Self {
+        match &self.focus {
+            Some(f) if f.area.contains(near.min) && f.area.contains(near.max) => &f.clusters,
+            _ => self,
+        }
     }
 
     /// The first result of `look` at the clusters that touch `near`.
     #[inline]
     fn find<T>(&self, near: &Aabb, mut look: impl FnMut(&Cluster) -> Option<T>) -> Option<T> {
-        if self.levels.is_empty() {
-            return Self::find_among(&self.all, near, &mut look);
+        let clusters = self.about(near);
+        if clusters.levels.is_empty() {
+            return Self::find_among(&clusters.all, near, &mut look);
         }
-        self.find_below(self.levels.len(), 0, near, &mut look)
+        clusters.find_below(clusters.levels.len(), 0, near, &mut look)
     }
 
     #[inline]
@@ -107,6 +144,14 @@ impl Clusters {
             boxes[i].intersects(near).then(|| self.find_below(below, i, near, look)).flatten()
         })
     }
+}
+
+/// Side of a square that would hold some dozens of these points if they lay evenly.
+fn some_dozens(points: &[Vec2]) -> f64 {
+    const DOZENS: f64 = 32.0;
+    let extent = Aabb::around(points.iter().copied());
+    let size = extent.max - extent.min;
+    size.x.max(size.y).max(f64::MIN_POSITIVE) / (points.len() as f64 / DOZENS).sqrt()
 }
 
 /// Sorts what lies in the plane along a curve on which neighbours lie together (Morton 1966).
@@ -181,7 +226,8 @@ impl EdgeIndex {
             add(&mut wall.edges());
         }
         let mut points = obstacles.points().to_vec();
-        if points.len() > FEW * CLUSTER {
+        let many = points.len() > FEW * CLUSTER;
+        if many {
             along_a_curve(&mut points, |&p| p);
         } else {
             // In stripes of two metres, so that a cluster's points lie together.
@@ -191,15 +237,35 @@ impl EdgeIndex {
                 stripes.then(a.y.total_cmp(&b.y)).then(a.x.total_cmp(&b.x))
             });
         }
-        let first = edges.len();
-        edges.extend(points.iter().map(|&p| (p, p)));
-        for (i, together) in points.chunks(CLUSTER).enumerate() {
-            let first = first + i * CLUSTER;
-            let aabb = Aabb::around(together.iter().copied());
-            clusters
-                .push(Cluster { aabb, edges: [first, first + together.len()].map(|i| i as u32) });
+        let mut together = |points: &[Vec2]| {
+            let first = edges.len();
+            edges.extend(points.iter().map(|&p| (p, p)));
+            let aabb = Aabb::around(points.iter().copied());
+            clusters.push(Cluster { aabb, edges: [first, edges.len()].map(|i| i as u32) });
+        };
+        if many {
+            // Neighbours on the curve may lie far apart where little is between them: not in one cluster.
+            let per_metre = 1.0 / some_dozens(&points);
+            let cell = |p: Vec2| ((p.x * per_metre).floor(), (p.y * per_metre).floor());
+            let (mut first, mut of_first) = (0, cell(points[0]));
+            for i in 1..points.len() {
+                let of_this = cell(points[i]);
+                if i - first == CLUSTER || of_this != of_first {
+                    together(&points[first..i]);
+                    (first, of_first) = (i, of_this);
+                }
+            }
+            together(&points[first..]);
+        } else {
+            points.chunks(CLUSTER).for_each(together);
         }
         Self { clusters: Clusters::new(clusters), polygons: Clusters::new(polygons), edges }
+    }
+
+    /// Makes queries within `area` fast where there is much else.
+    pub fn focus(&mut self, area: Aabb) {
+        self.clusters.focus(area);
+        self.polygons.focus(area);
     }
 
     /// The smallest box around everything.
@@ -248,8 +314,10 @@ mod tests {
         let points: Vec<Vec2> =
             (1..20_000).map(|i| Vec2::new(hash(i, 2_654_435_761), hash(i, 40_503_007))).collect();
         let obstacles = Obstacles::new(vec![], vec![], points.clone()).unwrap();
-        let index = EdgeIndex::new(&obstacles);
+        let mut index = EdgeIndex::new(&obstacles);
         assert!(index.clusters.levels.len() >= 2);
+        index.focus(Aabb::new(100.0, 100.0, 160.0, 170.0));
+        assert!(index.clusters.focus.is_some());
         assert_eq!(index.aabb(), Aabb::around(points.iter().copied()));
         for i in 1..200 {
             let min = Vec2::new(hash(i, 97_003), hash(i, 7_919_111));

@@ -135,6 +135,13 @@ impl CollisionWorld {
         self
     }
 
+    /// The same world, in which checks within `area` are as fast as if there were nothing else.
+    pub fn focused_on(mut self, area: Aabb) -> Self {
+        let kept = std::iter::once(&mut self.body).chain(&mut self.tolerated).chain(&mut self.low);
+        kept.for_each(|kept| kept.index.focus(area));
+        self
+    }
+
     /// The footprint (margin included) in the vehicle's frame.
     pub fn footprint(&self) -> &Aabb {
         &self.body.footprint
