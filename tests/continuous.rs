@@ -2,6 +2,9 @@
 
 #![cfg(feature = "lab")]
 
+#[path = "fixtures/narrow.rs"]
+mod narrow;
+
 use std::path::Path as FilePath;
 
 use assert_cmd::Command;
@@ -98,29 +101,15 @@ fn in_lots_and_clutter_too_with_vehicles_of_any_size() {
     );
 }
 
-/// Any motions with continuous curvature between changes of gear, of a vehicle of any size.
-/// Into a parallel spot of 1 m more than the car, no path of arcs that was found can be made smooth where it must be
-/// gone back and forth with the wheels turning all the time.
+/// Into a parallel spot of 1 m more than the car, no path of arcs that was found can be made smooth where the wheels
+/// must turn all the time.
 #[test]
 fn where_no_path_can_be_made_smooth_one_is_searched_for_that_is() {
-    let v = Vehicle::default();
-    let wall = |x0: f64, y0: f64, x1: f64, y1: f64| vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
-    let (half, lane) = ((v.length + 1.0) / 2.0, 1.2 + 3.2);
-    let narrow = Scene {
-        vehicle: v,
-        start: Pose::new(-9.0, lane - 1.1, 0.0),
-        goal: v.rear_axle(Pose::new(0.0, 0.0, 0.0)),
-        obstacles: vec![
-            wall(-half - 5.0, -1.0, -half, 1.0),
-            wall(half, -1.0, half + 5.0, 1.0),
-            wall(-20.0, -1.6, 20.0, -1.2),
-            wall(-20.0, lane, 20.0, lane + 0.4),
-        ],
-        ..Scene::default()
-    };
-    check(Method::N3P, vec![narrow], StandstillSteering::Never, 0);
+    let scene = narrow::narrow_spot(narrow::in_the_lane(-9.0), narrow::parked());
+    check(Method::N3P, vec![scene], StandstillSteering::Never, 0);
 }
 
+/// Any motions with continuous curvature between changes of gear, of a vehicle of any size.
 fn smooth_paths() -> impl Strategy<Value = (SmoothPath, Vehicle)> {
     let lock = Vehicle::default().max_curvature();
     let part = (-lock..lock, 0.05..4.0, 0.0..2.0, any::<bool>());

@@ -2,8 +2,10 @@
 
 #![cfg(feature = "lab")]
 
+#[path = "fixtures/narrow.rs"]
+mod narrow;
+
 use n3p::episode::{self, Case, Episode, EpisodeConfig};
-use n3p::geometry::Pose;
 use n3p::lab::evaluation::oracle;
 use n3p::n3p::{Method, MethodSettings, Models};
 use n3p::planners::goals::Terms;
@@ -71,31 +73,12 @@ fn what_can_be_parked_can_be_left() {
     assert!(searched * 3 < all, "{searched} of {all}");
 }
 
-/// A parallel spot of 1 m more than the car, beside a lane as wide as a car and a half.
-fn narrow() -> Scene {
-    let v = Vehicle::default();
-    let wall = |x0: f64, y0: f64, x1: f64, y1: f64| vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
-    let half = (v.length + 1.0) / 2.0;
-    let lane = 1.2 + 3.2;
-    Scene {
-        vehicle: v,
-        start: v.rear_axle(Pose::new(0.0, 0.0, 0.0)),
-        goal: Pose::new(6.0, lane - 1.1, 0.0),
-        obstacles: vec![
-            wall(-half - 5.0, -1.0, -half, 1.0),
-            wall(half, -1.0, half + 5.0, 1.0),
-            wall(-20.0, -1.6, 20.0, -1.2),
-            wall(-20.0, lane, 20.0, lane + 0.4),
-        ],
-        ..Scene::default()
-    }
-}
-
 /// A search that comes from outside has to find its way into the spot: 200,000 expansions were not enough.
 #[test]
 fn every_search_leaves_a_narrow_spot() {
+    let scene = narrow::narrow_spot(narrow::parked(), narrow::in_the_lane(6.0));
     for method in [Method::N3P, Method::HA_RS, Method::MHHA] {
-        let out = run(planner(method).as_mut(), narrow(), Terms::default());
+        let out = run(planner(method).as_mut(), scene.clone(), Terms::default());
         let expansions = out.result.expansions;
         assert!(out.result.outcome.is_ok() && expansions < 100_000, "{method} {expansions}");
     }

@@ -32,6 +32,12 @@ def start(*arguments):
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
+def collect(address, collection, bin_dir, *more):
+    """The arguments that collect on this Ray."""
+    places = {"--out": collection.out, "--bin-dir": bin_dir, "--address": address}
+    return ["collect", collection.config, *sum(places.items(), ()), *more]
+
+
 def end(process, code):
     out, err = process.communicate(timeout=100)
     assert process.returncode == code, out + err
@@ -66,16 +72,7 @@ def kill_worker(hung):
 def test_a_lost_worker_is_made_up_for(address, collection, bin_dir):
     for what in ("hang-3", "fail-2"):
         (bin_dir / what).touch()
-    process = start(
-        "collect",
-        collection.config,
-        "--out",
-        collection.out,
-        "--bin-dir",
-        bin_dir,
-        "--address",
-        address,
-    )
+    process = start(*collect(address, collection, bin_dir))
     kill_worker(bin_dir / "hung")
     said = end(process, 0)
     assert "3.dat: try 1 failed, going on: the worker was lost" in said
@@ -84,17 +81,7 @@ def test_a_lost_worker_is_made_up_for(address, collection, bin_dir):
 
 
 def test_ctrl_c_leaves_what_is_finished(address, collection, bin_dir):
-    arguments = [
-        "collect",
-        collection.config,
-        "--out",
-        collection.out,
-        "--bin-dir",
-        bin_dir,
-        "--address",
-        address,
-        "--shared",
-    ]
+    arguments = collect(address, collection, bin_dir, "--shared")
     (bin_dir / "hang-4").touch()
     process = start(*arguments)
     for part in (1, 2, 3):
@@ -114,16 +101,7 @@ def test_ctrl_c_leaves_what_is_finished(address, collection, bin_dir):
 
 
 def test_bad_input_and_what_fails_again_and_again_end_a_run(address, collection, bin_dir):
-    arguments = [
-        "collect",
-        collection.config,
-        "--out",
-        collection.out,
-        "--bin-dir",
-        bin_dir,
-        "--address",
-        address,
-    ]
+    arguments = collect(address, collection, bin_dir)
     (bin_dir / "refuse-2").touch()
     assert "n3p-collect ended with 2: error: seed: expected another" in end(start(*arguments), 2)
     (bin_dir / "fail-5").touch()

@@ -52,7 +52,7 @@ pub(super) fn plan(
         Ok(path) => path.to_world(&parking.frame).reversed().seen_from(&problem.frame),
         Err(reason) => return Some(none(*reason)),
     };
-    // Who stops beside the spot cannot start there.
+    // A policy stops beside its goal; the car starts where it stands, and the lengths of the path are fitted to that.
     let path = Path { start: problem.start, ..path };
     let exactly = |fitted: PlanResult| PlanResult { smooth: None, ..fitted };
     let fitted = continuous::fitted(problem, &path, &Terms::default()).map(exactly)?;
