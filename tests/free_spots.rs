@@ -3,6 +3,7 @@
 //! `COUNT=100 cargo test --release --test free_spots -- --nocapture found` prints the shares of docs/formats.md.
 #![cfg(all(feature = "scene", feature = "models"))]
 
+use std::f64::consts::PI;
 use std::fs;
 use std::path::Path;
 
@@ -69,6 +70,7 @@ fn score(name: &str, kind: ParkingType, scenes: impl Iterator<Item = Scene>) -> 
             let goals = free.spot.goals(vehicle);
             let apart = |other: &FreeSpot| vehicle.overlap(other.spot.goals(vehicle)[0], goals[0]);
             assert_eq!(goals.len(), 2, "{}: {free:?}", scene.name);
+            assert!(goals.iter().all(|g| g.heading.abs() <= PI), "{}: {goals:?}", scene.name);
             assert!(spots[..i].iter().all(|other| apart(other) < 0.1), "{}: {free:?}", scene.name);
             let wanted = Scene { goal: goals[0], goals, parking_type: None, ..scene.clone() };
             score.spots += 1;

@@ -34,7 +34,7 @@ use super::goals::GoalTolerance;
 use super::scene::{SceneError, stem};
 use super::scene_file::parse_json;
 use super::{DrivableArea, LowObstacles, ParkingType, PreviousPath, Scene, tpcap};
-use crate::geometry::Pose;
+use crate::geometry::{Pose, wrap_angle};
 use crate::vehicle::{Margins, Vehicle};
 
 /// A place to park in, in its own frame; metres and radians. Fields are those of a [`Scene`].
@@ -115,12 +115,13 @@ pub struct Spot {
 }
 
 impl Spot {
-    /// The poses of a car parked in its middle, both ways; none where the car is longer or wider.
+    /// The poses of a car parked in its middle, both ways, headings in (−π, π]; none where the car is longer or wider.
     pub fn goals(&self, vehicle: &Vehicle) -> Vec<Pose> {
         let Pose { x, y, heading } = self.middle;
         let fits = vehicle.length <= self.length && vehicle.width <= self.width;
         let ways: &[f64] = if fits { &[0.0, std::f64::consts::PI] } else { &[] };
-        ways.iter().map(|turn| vehicle.rear_axle(Pose::new(x, y, heading + turn))).collect()
+        let parked = |turn| vehicle.rear_axle(Pose::new(x, y, wrap_angle(heading + turn)));
+        ways.iter().map(parked).collect()
     }
 }
 
