@@ -15,7 +15,7 @@ use crate::episode::Case;
 use crate::episode::Row;
 use crate::geometry::{Aabb, Pose, Vec2};
 use crate::vehicle::Vehicle;
-use crate::world::{Outline, Scene, Shape};
+use crate::world::{DrivableArea, Outline, Scene, Shape};
 
 /// Runs of no more scenes are shown whole.
 pub const ALL: usize = 1000;
@@ -88,7 +88,7 @@ pub struct SceneView {
     pub low: Outlines,
     /// The drivable area.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub drivable_area: Option<AreaView>,
+    pub drivable_area: Option<DrivableArea>,
     /// The scene's bounds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bounds: Option<[f64; 4]>,
@@ -115,16 +115,6 @@ impl Outlines {
     fn is_empty(&self) -> bool {
         *self == Self::default()
     }
-}
-
-/// A drivable area: its border, and those of its holes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct AreaView {
-    /// Its border.
-    pub outer: Vec<[f64; 2]>,
-    /// Borders of what is not drivable within.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub holes: Vec<Vec<[f64; 2]>>,
 }
 
 /// One method in one scene: its row, and its trace if there is one. What is usual is left out of the JSON.
@@ -337,7 +327,7 @@ impl SceneView {
         };
         let mut borders = of(Shape::Border, false).into_iter();
         let drivable_area =
-            borders.next().map(|outer| AreaView { outer, holes: borders.collect() });
+            borders.next().map(|outer| DrivableArea { outer, holes: borders.collect() });
         Self {
             name: scene.name.clone(),
             world: world(&case.set).to_owned(),
