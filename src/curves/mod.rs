@@ -6,6 +6,7 @@
 //! without a stop. A [`Trajectory`] says when a car that drives a path is where.
 
 mod clothoid;
+pub(crate) mod least_norm;
 mod path;
 pub mod reeds_shepp;
 mod segment;

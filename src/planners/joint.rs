@@ -7,7 +7,7 @@
 //! where they led before. Gears stay, curvatures stay within the steering limit, and the
 //! result is checked like any path.
 
-use crate::curves::{Path, Segment};
+use crate::curves::{Path, Segment, least_norm};
 use crate::geometry::{Pose, signed_angle};
 
 use super::Problem;
@@ -18,6 +18,8 @@ use crate::vehicle::Vehicle;
 const STEPS: usize = 12;
 /// Remaining error that counts as none, metres and radians.
 const EXACT: f64 = 1e-10;
+/// Least determinant of what a step is solved with.
+const SINGULAR: f64 = 1e-12;
 
 /// The free path from the start of `problem` to the end of `path`, which begins nearby,
 /// with as many as possible of its last motions unchanged.
@@ -72,9 +74,10 @@ fn bend(
             let unless = |fixed: bool, column: [f64; 3]| if fixed { [0.0; 3] } else { column };
             columns.push([unless(fixed[i][0], by_length), unless(fixed[i][1], by_curvature)]);
         }
-        let multipliers = solve(normal(columns.as_flattened()), error)?;
+        let moves = columns.as_flattened().iter().copied();
+        let by = least_norm::multipliers(moves, error, 0.0, SINGULAR)?;
         for ((s, c), fixed) in bent.iter_mut().zip(&columns).zip(&mut fixed) {
-            let [by_length, by_curvature] = c.map(|c| dot(c, multipliers));
+            let [by_length, by_curvature] = c.map(|c| least_norm::dot(c, by));
             let gear = s.gear().sign();
             let length = gear * (s.length + by_length);
             let curvature = s.curvature + by_curvature * max_curvature;
@@ -94,31 +97,6 @@ fn end_of(segments: &[Segment], start: Pose) -> Pose {
 /// `to` less `from`: x, y, heading.
 fn difference(from: Pose, to: Pose) -> [f64; 3] {
     [to.x - from.x, to.y - from.y, signed_angle(from.heading, to.heading)]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// J·Jᵀ, where `columns` are those of J.
-fn normal(columns: &[[f64; 3]]) -> [[f64; 3]; 3] {
-    let entry = |r: usize, c: usize| columns.iter().map(|col| col[r] * col[c]).sum();
-    [0, 1, 2].map(|r| [0, 1, 2].map(|c| entry(r, c)))
-}
-
-/// The solution of `m`·x = `b` for a symmetric `m`, by Cramer's rule; `None` where it is
-/// singular.
-fn solve(m: [[f64; 3]; 3], b: [f64; 3]) -> Option<[f64; 3]> {
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    };
-    let cofactors = [cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])];
-    let determinant = dot(m[0], cofactors[0]);
-    if determinant.abs() < 1e-12 {
-        return None;
-    }
-    let row = |r: usize| (0..3).map(|i| cofactors[i][r] * b[i]).sum::<f64>() / determinant;
-    Some([row(0), row(1), row(2)])
 }
 
 #[cfg(test)]

@@ -26,11 +26,14 @@ const ZERO: f64 = 1e-9;
 /// One word between two poses: up to five segments, lengths in metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Word {
-    segments: [Segment; 5],
+    segments: [Segment; Word::MOST],
     len: usize,
 }
 
 impl Word {
+    /// No word has more segments.
+    const MOST: usize = 5;
+
     /// The segments in driving order, metres.
     pub fn segments(&self) -> &[Segment] {
         &self.segments[..self.len]

@@ -3,14 +3,15 @@
 //! A start on an earlier plan lies on a curve of few segments, up to rounding; the formulas then
 //! find a word with one more segment, of millimetres or less. Left out, the others are refitted.
 
-use nalgebra::{DMatrix, DVector};
-
 use super::Word;
 use crate::curves::Segment;
+use crate::curves::least_norm::{self, Move};
 use crate::geometry::{Pose, signed_angle};
 
 /// What the refitted word may miss its end by, metres and radians.
 const EXACT: f64 = 3e-7;
+/// Few segments do not lead everywhere; their steps are solved with so much more on the diagonal.
+const DAMPING: f64 = 1e-12;
 
 impl Word {
     /// This word from `from` to `to` without its segments shorter than `least` metres, if the
@@ -31,17 +32,18 @@ impl Word {
         }
         for _ in 0..4 {
             let error = miss(&word, from, to);
-            if error.amax() < EXACT {
+            if largest(error) < EXACT {
                 return Some(word);
             }
-            if word.len == 0 || error.amax() > 10.0 * least {
+            if word.len == 0 || largest(error) > 10.0 * least {
                 return None;
             }
-            let step =
-                jacobian(&word, from, to, &error).svd(true, true).solve(&error, 1e-9).ok()?;
-            for (s, change) in word.segments[..word.len].iter_mut().zip(step.iter()) {
+            let columns = jacobian(&word, from, to, error);
+            let moves = columns[..word.len].iter().copied();
+            let by = least_norm::multipliers(moves, error, DAMPING, 0.0)?;
+            for (s, column) in word.segments[..word.len].iter_mut().zip(columns) {
                 let gear = s.gear();
-                s.length -= change;
+                s.length -= least_norm::dot(column, by);
                 if s.gear() != gear {
                     return None;
                 }
@@ -52,21 +54,27 @@ impl Word {
 }
 
 /// How far the word ends from `to`.
-fn miss(word: &Word, from: Pose, to: Pose) -> DVector<f64> {
+fn miss(word: &Word, from: Pose, to: Pose) -> Move {
     let end = word.segments().iter().fold(from, |pose, s| s.end(pose));
-    DVector::from_vec(vec![end.x - to.x, end.y - to.y, signed_angle(to.heading, end.heading)])
+    [end.x - to.x, end.y - to.y, signed_angle(to.heading, end.heading)]
 }
 
-/// How the miss changes with the length of each segment.
-fn jacobian(word: &Word, from: Pose, to: Pose, error: &DVector<f64>) -> DMatrix<f64> {
+fn largest(miss: Move) -> f64 {
+    miss.into_iter().map(f64::abs).fold(0.0, f64::max)
+}
+
+/// How the miss changes with the length of each segment, as far as there are segments.
+fn jacobian(word: &Word, from: Pose, to: Pose, error: Move) -> [Move; Word::MOST] {
     const H: f64 = 1e-6;
-    let column = |i: usize| {
+    let mut columns = [[0.0; 3]; Word::MOST];
+    for (i, column) in columns[..word.len].iter_mut().enumerate() {
         let mut longer = *word;
         let s = longer.segments[i];
         longer.segments[i] = Segment { length: s.length + H, ..s };
-        (miss(&longer, from, to) - error) / H
-    };
-    DMatrix::from_columns(&(0..word.len).map(column).collect::<Vec<_>>())
+        let moved = miss(&longer, from, to);
+        *column = [0, 1, 2].map(|k| (moved[k] - error[k]) / H);
+    }
+    columns
 }
 
 #[cfg(test)]
@@ -114,7 +122,7 @@ mod tests {
                 missed += 1;
             }
             for w in out.iter().filter_map(|w| w.without_shorter_than(least, from, to)) {
-                assert!(miss(&w, from, to).amax() < EXACT && w.shortest_segment() > 0.5 * least);
+                assert!(largest(miss(&w, from, to)) < EXACT && w.shortest_segment() > 0.5 * least);
             }
         }
         // Now and then what mends the rounding is longer than the shortest motion.

@@ -1,8 +1,7 @@
 //! Fitting the lengths of straights and turns to where they are to lead.
 
-use nalgebra::{Matrix3, Vector3};
-
 use super::turn::{Piece, Way, then, then_turned};
+use crate::curves::least_norm::{Move, dot, multipliers};
 use crate::geometry::{Pose, signed_angle};
 
 /// What a fitted path may miss its goal by, metres and radians.
@@ -15,7 +14,7 @@ const STEPS: usize = 12;
 pub(super) fn fit(pieces: &mut [Piece], start: Pose, goal: Pose) -> bool {
     let mut ways: Vec<(Way, Way)> = Vec::with_capacity(pieces.len());
     let mut poses: Vec<(Way, f64, f64)> = Vec::with_capacity(pieces.len());
-    let mut columns: Vec<Vector3<f64>> = Vec::with_capacity(pieces.len());
+    let mut columns: Vec<Move> = Vec::with_capacity(pieces.len());
     let mut clothoids: Vec<Option<[Way; 2]>> = vec![None; pieces.len()];
     let mut fixed = vec![false; pieces.len()];
     // Angles in metres: as the tightest turn sweeps them.
@@ -23,7 +22,7 @@ pub(super) fn fit(pieces: &mut [Piece], start: Pose, goal: Pose) -> bool {
     if tightest == 0.0 {
         let start = [start.x, start.y, start.heading];
         let end = pieces.iter().fold(start, |a, piece| then(a, piece.way(&mut None).0));
-        return missed(end, goal).amax() < EXACT;
+        return has_met(missed(end, goal));
     }
     let radius = 1.0 / tightest;
     for _ in 0..STEPS {
@@ -38,13 +37,13 @@ pub(super) fn fit(pieces: &mut [Piece], start: Pose, goal: Pose) -> bool {
             poses.push((whole, sin, cos));
         }
         let miss = missed(whole, goal);
-        if miss.amax() < EXACT {
+        if has_met(miss) {
             return true;
         }
         if !miss.iter().all(|v| v.is_finite()) {
             return false;
         }
-        let target = -Vector3::new(miss.x, miss.y, miss.z * radius);
+        let target = [-miss[0], -miss[1], -miss[2] * radius];
         columns.clear();
         for ((piece, (_, change)), &(after, sin, cos)) in pieces.iter().zip(&ways).zip(&poses) {
             let rest = [whole[0] - after[0], whole[1] - after[1]];
@@ -52,7 +51,7 @@ pub(super) fn fit(pieces: &mut [Piece], start: Pose, goal: Pose) -> bool {
             let dy = sin * change[0] + cos * change[1] + change[2] * rest[0];
             // Per metre: turns are measured along the tightest arc.
             let unit = if piece.is_straight() { 1.0 } else { tightest };
-            columns.push(Vector3::new(dx, dy, change[2] * radius) * unit);
+            columns.push([dx, dy, change[2] * radius].map(|v| v * unit));
         }
         if !step(pieces, &columns, &mut fixed, target, tightest) {
             return false;
@@ -65,9 +64,9 @@ pub(super) fn fit(pieces: &mut [Piece], start: Pose, goal: Pose) -> bool {
 /// truth, and lets no value go below its least. `false` where there is none.
 fn step(
     pieces: &mut [Piece],
-    columns: &[Vector3<f64>],
+    columns: &[Move],
     fixed: &mut [bool],
-    target: Vector3<f64>,
+    target: Move,
     tightest: f64,
 ) -> bool {
     /// Of the radius, so far at once at most.
@@ -76,29 +75,18 @@ fn step(
     let mut target = target;
     // What would go below its least goes there, and the others share what is left.
     for _ in 0..=pieces.len() {
-        let mut square = Matrix3::zeros();
-        let mut free = 0;
-        for (column, _) in columns.iter().zip(fixed.iter()).filter(|(_, fixed)| !**fixed) {
-            square += column * column.transpose();
-            free += 1;
-        }
-        if free < 3 {
+        let free = || columns.iter().zip(&*fixed).filter(|(_, fixed)| !**fixed).map(|(c, _)| *c);
+        if free().count() < 3 {
             return false;
         }
-        let Some(inverse) = square.try_inverse() else { return false };
-        let share = inverse * target;
-        let largest = columns
-            .iter()
-            .zip(fixed.iter())
-            .filter(|(_, f)| !**f)
-            .map(|(c, _)| c.dot(&share).abs());
-        let largest = largest.fold(0.0, f64::max);
+        let Some(share) = multipliers(free(), target, 0.0, 0.0) else { return false };
+        let largest = free().map(|c| dot(c, share).abs()).fold(0.0, f64::max);
         if !largest.is_finite() {
             return false;
         }
         let scale = (FAR / tightest / largest).min(1.0);
         let change = |i: usize, piece: &Piece| {
-            let metres = columns[i].dot(&share) * scale;
+            let metres = dot(columns[i], share) * scale;
             if piece.is_straight() { metres } else { metres * tightest }
         };
         let mut held = false;
@@ -106,7 +94,8 @@ fn step(
             let least = piece.least();
             if !fixed[i] && piece.value + change(i, piece) < least - 1e-12 {
                 let unit = if piece.is_straight() { 1.0 } else { tightest };
-                target -= columns[i] * ((least - piece.value) / unit);
+                let by = (least - piece.value) / unit;
+                (0..3).for_each(|k| target[k] -= columns[i][k] * by);
                 (fixed[i], held) = (true, true);
             }
         }
@@ -123,6 +112,10 @@ fn step(
 }
 
 /// How far the end of a way is from `goal`, metres and radians.
-fn missed(whole: Way, goal: Pose) -> Vector3<f64> {
-    Vector3::new(whole[0] - goal.x, whole[1] - goal.y, signed_angle(goal.heading, whole[2]))
+fn missed(whole: Way, goal: Pose) -> Move {
+    [whole[0] - goal.x, whole[1] - goal.y, signed_angle(goal.heading, whole[2])]
+}
+
+fn has_met(miss: Move) -> bool {
+    miss.iter().all(|v| v.abs() < EXACT)
 }

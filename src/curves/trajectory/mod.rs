@@ -240,7 +240,7 @@ impl Trajectory {
         let grid = (1..).map(|i| f64::from(i) / per_second).take_while(|&t| t < self.end.time);
         let mut times: Vec<f64> = grid.filter(|&t| is_apart(t)).collect();
         times.extend(&changes);
-        times.sort_by(f64::total_cmp);
+        times.sort_unstable_by(f64::total_cmp);
         times.into_iter().map(|t| self.at(t)).collect()
     }
 
