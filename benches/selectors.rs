@@ -1,14 +1,17 @@
 //! How long does a selector take to choose preparatory poses?
 //!
 //! One query each, over fixed scenes of every type and level, with the models of the
-//! repository. The trees of the cells are built in the warm-up.
+//! repository; the points of the cells are computed in the warm-up. `nearest_…`: one of so many
+//! samples of a cell; below 2,000 each is looked at, from there on a tree is asked.
 
 mod common;
 
 use std::hint::black_box;
+use std::num::NonZero;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use n3p::n3p::{Method, Models};
+use n3p::selectors::nearest::Points;
 use n3p::vehicle::Vehicle;
 use n3p::world::ParkingType;
 
@@ -36,6 +39,22 @@ fn bench(c: &mut Criterion) {
                 let features = black_box(next.next().expect("endless"));
                 selector.select(features, &vehicle, k, &mut poses);
                 poses.len()
+            });
+        });
+    }
+    for count in [120, 500, 1_999, 2_000, 20_000] {
+        let mut state = 1_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        let mut point = || [16.0 * random(), 6.0 * random(), 2.0 * random(), 2.0 * random()];
+        let points = Points::new((0..count).map(|_| point()).collect());
+        let queries: Vec<_> = (0..64).map(|_| point()).collect();
+        let mut next = queries.iter().cycle();
+        group.bench_function(format!("nearest_{count}"), |b| {
+            b.iter(|| {
+                points.nearest(black_box(next.next().expect("endless")), NonZero::<usize>::MIN)
             });
         });
     }

@@ -6,11 +6,11 @@
 
 use std::time::Instant;
 
-use n3p::lab::evaluation::suite;
 use n3p::n3p::{Method, MethodSettings, Models};
 use n3p::planners::{Budget, Problem};
 use n3p::vehicle::Vehicle;
-use n3p::world::{Level, ParkingType};
+use n3p::world::generate::{GeneratorConfig, generate};
+use n3p::world::{Level, ParkingType, Scene};
 
 const SEED: u64 = 1;
 const BUDGET: Budget = Budget::new(200_000);
@@ -28,12 +28,14 @@ fn main() -> anyhow::Result<()> {
     let mut planner = method.build(&models, &MethodSettings::default())?;
     for &kind in &kinds {
         for &level in &levels {
-            let cases = suite::at_home(&Vehicle::default(), &[kind], &[level], count, SEED)?;
+            let of = (&GeneratorConfig::default(), &Vehicle::default());
+            let scenes: Vec<Scene> =
+                (0..count).map(|i| generate(of.0, of.1, kind, level, SEED, i as u64)).collect();
             let (mut times, mut failures, mut expansions) = (Vec::new(), 0, 0);
-            for case in &cases {
+            for scene in &scenes {
                 for _ in 0..repeats {
                     let start = Instant::now();
-                    let problem = Problem::new(&case.scene)?;
+                    let problem = Problem::new(scene)?;
                     let result = planner.plan(&problem, BUDGET);
                     times.push(start.elapsed().as_secs_f64());
                     failures += usize::from(result.outcome.is_err());

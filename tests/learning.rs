@@ -17,6 +17,7 @@ use n3p::selectors::knn::KnnSelector;
 use n3p::selectors::knn_file;
 use n3p::selectors::mlp::MlpSelector;
 use n3p::selectors::model::Model;
+use n3p::selectors::nearest;
 use n3p::selectors::network::{LAYERS, LayerWeights, pose_from_outputs};
 use n3p::selectors::{Features, Normaliser, PoseSelector, UNIT_COUNT, UNIT_NAMES};
 use n3p::vehicle::Vehicle;
@@ -141,7 +142,7 @@ proptest! {
             let point = KnnSelector::point(query, radius);
             let mut scan: Vec<_> = (0..stored.len())
                 .map(|i| (KnnSelector::point(knn.file().start(0, i), radius), i))
-                .map(|(p, i)| (KnnSelector::distance_sq(&p, &point), i))
+                .map(|(p, i)| (nearest::distance_sq(&p, &point), i))
                 .collect();
             scan.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             scan.truncate(n);

@@ -185,6 +185,7 @@ pub fn seeds() -> Vec<(&'static str, Vec<u8>)> {
             kind,
             cells: grid.cell_count(kind),
             samples: 2,
+            poses: 0,
             manoeuvres: 2,
             segments: 4,
             manoeuvres_by_stance: Vec::new(),
@@ -193,7 +194,7 @@ pub fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         seed: 1,
         crate_version: "0.1.0".to_owned(),
     };
-    let whole = knn_file::encode(&header, &[entries]);
+    let whole = knn_file::encode(header, &[entries]);
     let length = u32::from_le_bytes(whole[12..16].try_into().unwrap()) as u16;
     let parts = [&length.to_le_bytes(), &whole[56..]].concat();
     let mut seeds = vec![("knn", whole), ("knn", parts)];

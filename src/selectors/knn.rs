@@ -15,10 +15,9 @@ use std::num::NonZero;
 use std::path::Path;
 use std::sync::OnceLock;
 
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
-
 use super::artefact::{self, ArtefactError};
 use super::knn_file::KnnFile;
+use super::nearest::{MetricPoint, Points};
 use super::{Features, PoseSelector};
 use crate::curves::Segment;
 use crate::geometry::{Pose, signed_angle};
@@ -26,25 +25,13 @@ use crate::vehicle::Vehicle;
 use crate::world::cell::Grid;
 use crate::world::{ParkingType, Stance};
 
-/// The KNN selector. A cell's search tree is built when the cell is first asked for (some
-/// ten microseconds), so that loading costs little more than the checksum.
+/// The KNN selector. A cell's points are computed when the cell is first asked for, so that loading
+/// costs little more than the checksum.
 #[derive(Debug)]
 pub struct KnnSelector {
     file: KnnFile,
     /// `[kind][cell]`, as in the file.
-    cells: Vec<Vec<OnceLock<CellPoints>>>,
-}
-
-/// The metric's points of one cell, in sample order, and their tree.
-struct CellPoints {
-    points: Vec<[f32; 4]>,
-    tree: ImmutableKdTree<f32, 4>,
-}
-
-impl std::fmt::Debug for CellPoints {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "CellPoints({})", self.points.len())
-    }
+    cells: Vec<Vec<OnceLock<Points>>>,
 }
 
 /// A stored sample near a query.
@@ -96,18 +83,9 @@ impl KnnSelector {
     }
 
     /// The point of a pose in the metric, metres. `radius`: metres per radian.
-    pub fn point(pose: Pose, radius: f64) -> [f32; 4] {
+    pub fn point(pose: Pose, radius: f64) -> MetricPoint {
         let (sin, cos) = pose.sin_cos();
         [pose.x, pose.y, radius * cos, radius * sin].map(|v| v as f32)
-    }
-
-    /// Squared distance of two points of the metric, m², summed in double precision.
-    pub fn distance_sq(a: &[f32; 4], b: &[f32; 4]) -> f64 {
-        let squares = std::array::from_fn::<f64, 4, _>(|i| {
-            let d = f64::from(a[i]) - f64::from(b[i]);
-            d * d
-        });
-        squares.iter().sum()
     }
 
     /// The cell whose samples answer for `cell`: itself, or where it has none the nearest
@@ -154,55 +132,18 @@ impl KnnSelector {
         }
         let first = self.file.samples(kind, cell).start;
         let query = Self::point(features.start, header.heading_radius);
-        let mut hits = self.points(kind, cell).nearest(&query, n);
-        hits.truncate(n.get());
+        let hits = self.points(kind, cell).nearest(&query, n);
         hits.into_iter()
             .map(|(distance_sq, i)| Neighbour { distance_sq, cell, sample: first + i })
             .collect()
     }
 
-    fn points(&self, kind: usize, cell: usize) -> &CellPoints {
+    fn points(&self, kind: usize, cell: usize) -> &Points {
         self.cells[kind][cell].get_or_init(|| {
             let radius = self.file.header().heading_radius;
             let starts = self.file.samples(kind, cell).map(|i| self.file.start(kind, i));
-            let points: Vec<_> = starts.map(|s| Self::point(s, radius)).collect();
-            let tree = ImmutableKdTree::new_from_slice(&points)
-                .expect("a cell's points are finite and not empty");
-            CellPoints { points, tree }
+            Points::new(starts.map(|s| Self::point(s, radius)).collect())
         })
-    }
-}
-
-impl CellPoints {
-    /// At least the `n` nearest `(distance_sq, position)`, sorted by both.
-    ///
-    /// The tree computes in single precision and breaks ties as it likes, so it is asked
-    /// for one more. Where that one is clearly farther the others are the nearest; where it
-    /// is not, a scan decides.
-    fn nearest(&self, query: &[f32; 4], n: NonZero<usize>) -> Vec<(f64, usize)> {
-        /// Far above the rounding of a sum of four squares in single precision (2e-7).
-        const ROUNDING: f64 = 1e-5;
-        let exact = |i: usize| (KnnSelector::distance_sq(&self.points[i], query), i);
-        let by_distance =
-            |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1));
-        if n.get() < self.points.len() {
-            let found = self
-                .tree
-                .query(query)
-                .nearest_n::<SquaredEuclidean<f32>>(n.saturating_add(1))
-                .execute();
-            let mut hits: Vec<_> = found.iter().map(|hit| exact(hit.item as usize)).collect();
-            hits.sort_unstable_by(by_distance);
-            if let [.., last_wanted, beyond] = hits[..]
-                && hits.len() > n.get()
-                && beyond.0 > last_wanted.0 * (1.0 + ROUNDING) + f64::MIN_POSITIVE
-            {
-                return hits;
-            }
-        }
-        let mut all: Vec<_> = (0..self.points.len()).map(exact).collect();
-        all.sort_unstable_by(by_distance);
-        all
     }
 }
 

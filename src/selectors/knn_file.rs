@@ -1,4 +1,4 @@
-//! The file format `knn.bin`, version 3.
+//! The file format `knn.bin`, version 4.
 //!
 //! All numbers are little-endian. Nothing needs alignment, so the bytes are used as they lie.
 //!
@@ -10,10 +10,11 @@
 //! | 8 | length of the payload |
 //! | 32 | SHA-256 of the 24 bytes above, the header and the payload |
 //! | … | header: [`KnnHeader`] as JSON |
-//! | … | payload: for each entry of [`KnnHeader::kinds`] five arrays |
+//! | … | payload: for each entry of [`KnnHeader::kinds`] six arrays |
 //!
 //! The arrays of a parking type: `cells + 1` offsets (u32), where cell `i` owns the samples
-//! `offsets[i]..offsets[i + 1]`; the starts (3 × i16 each); the preparatory poses
+//! `offsets[i]..offsets[i + 1]`; the starts (3 × i16 each); which preparatory pose each sample has
+//! (as many bytes as [`KindHeader::poses`] needs); the preparatory poses, since samples share them
 //! (3 × 24-bit integer each); where the manoeuvres of the library begin among the segments
 //! (`manoeuvres + 1` × u32); the segments (curvature in 1/m and signed length in m, 2 × f32
 //! each). Positions count in `extent / 32767` metres for starts, which
@@ -21,10 +22,10 @@
 //! π / 32767 and π / 8388607 radians. With an extent of 16 m a pose is exact to 1 µm and
 //! 0.2 µrad, some thousand times below the planner's clearance margin
 //! ([`crate::planners::Problem::MARGIN`]), so rounding does not take its free Reeds-Shepp
-//! connection away. Manoeuvres are driven back from the goal, so they always end there. A
-//! sample takes 15 bytes.
+//! connection away. Manoeuvres are driven back from the goal, so they always end there.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -42,7 +43,7 @@ use crate::world::{ParkingType, Stance};
 /// First bytes of every `knn.bin`.
 pub const MAGIC: [u8; 8] = *b"N3P-KNN\0";
 /// The format version written and read by this program.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 
 const PREAMBLE: usize = 56;
 const CHECKSUM: Range<usize> = 24..56;
@@ -84,6 +85,8 @@ pub struct KindHeader {
     pub cells: usize,
     /// Number of samples.
     pub samples: usize,
+    /// Number of different preparatory poses; [`encode`] counts them.
+    pub poses: usize,
     /// Number of manoeuvres in the library.
     pub manoeuvres: usize,
     /// Number of segments of all manoeuvres.
@@ -143,23 +146,36 @@ pub struct KnnEntries {
 }
 
 /// The bytes of a file. `entries`: of each of [`KnnHeader::kinds`].
-pub fn encode(header: &KnnHeader, entries: &[KnnEntries]) -> Vec<u8> {
-    let json = serde_json::to_vec(header).expect("a header is plain data");
+pub fn encode(mut header: KnnHeader, entries: &[KnnEntries]) -> Vec<u8> {
     let mut payload = Vec::new();
-    for (kind, KnnEntries { samples: entries, manoeuvres }) in header.kinds.iter().zip(entries) {
+    let extent = header.extent;
+    for (kind, KnnEntries { samples: entries, manoeuvres }) in header.kinds.iter_mut().zip(entries)
+    {
         for cell in 0..=kind.cells {
             let offset = entries.partition_point(|e| (e.cell as usize) < cell) as u32;
             payload.extend(offset.to_le_bytes());
         }
         for e in entries {
-            for v in steps(e.start, header.extent, START_STEPS) {
+            for v in steps(e.start, extent, START_STEPS) {
                 payload.extend((v as i16).to_le_bytes());
             }
         }
-        for e in entries {
-            for v in steps(e.preparatory, header.extent, POSE_STEPS) {
-                payload.extend(&v.to_le_bytes()[..3]);
-            }
+        let mut poses: Vec<[i32; 3]> = Vec::new();
+        let mut known = HashMap::new();
+        let mut which = |e: &KnnEntry| {
+            let pose = steps(e.preparatory, extent, POSE_STEPS);
+            *known.entry(pose).or_insert_with(|| {
+                poses.push(pose);
+                poses.len() - 1
+            })
+        };
+        let which: Vec<usize> = entries.iter().map(&mut which).collect();
+        kind.poses = poses.len();
+        for pose in which {
+            payload.extend(&pose.to_le_bytes()[..index_bytes(poses.len())]);
+        }
+        for v in poses.as_flattened() {
+            payload.extend(&v.to_le_bytes()[..3]);
         }
         let mut begin = 0_u32;
         for manoeuvre in manoeuvres {
@@ -172,6 +188,7 @@ pub fn encode(header: &KnnHeader, entries: &[KnnEntries]) -> Vec<u8> {
             payload.extend((s.length as f32).to_le_bytes());
         }
     }
+    let json = serde_json::to_vec(&header).expect("a header is plain data");
     let mut bytes = MAGIC.to_vec();
     bytes.extend(VERSION.to_le_bytes());
     bytes.extend((json.len() as u32).to_le_bytes());
@@ -181,6 +198,12 @@ pub fn encode(header: &KnnHeader, entries: &[KnnEntries]) -> Vec<u8> {
     bytes.extend(json);
     bytes.extend(payload);
     bytes
+}
+
+/// Bytes of a number below `count`.
+fn index_bytes(count: usize) -> usize {
+    let last = count.saturating_sub(1);
+    (usize::BITS - last.leading_zeros()).div_ceil(8).max(1) as usize
 }
 
 /// A checked `knn.bin`, in memory.
@@ -197,9 +220,24 @@ pub struct KnnFile {
 struct Section {
     offsets: usize,
     starts: usize,
+    which_pose: Indices,
     poses: usize,
     segment_begins: usize,
     segments: usize,
+}
+
+/// An array of numbers that take the same few bytes each.
+#[derive(Clone, Copy, Debug)]
+struct Indices {
+    begin: usize,
+    bytes: usize,
+}
+
+impl Indices {
+    fn get(self, bytes: &[u8], i: usize) -> usize {
+        let at = self.begin + self.bytes * i;
+        bytes[at..at + self.bytes].iter().rev().fold(0, |n, byte| n << 8 | usize::from(*byte))
+    }
 }
 
 impl KnnFile {
@@ -238,7 +276,8 @@ impl KnnFile {
 
     /// The preparatory pose of a sample, spot frame.
     pub fn preparatory(&self, kind: usize, sample: usize) -> Pose {
-        let at = self.sections[kind].poses + POSE_BYTES * sample;
+        let section = &self.sections[kind];
+        let at = section.poses + POSE_BYTES * section.which_pose.get(&self.bytes, sample);
         let bytes = &self.bytes[at..at + POSE_BYTES];
         // The sign sits in the third byte: place the three above an empty one and shift.
         let v =
@@ -288,8 +327,9 @@ fn check(bytes: &[u8], is_compiled_in: bool) -> Result<(KnnHeader, Vec<Section>)
         return Err(Fault::Checksum);
     }
     let payload = PREAMBLE + header_len;
-    let header: KnnHeader = serde_json::from_slice(&bytes[PREAMBLE..payload])
-        .map_err(|e| Fault::Header(e.to_string()))?;
+    let json = std::str::from_utf8(&bytes[PREAMBLE..payload]);
+    let json = json.map_err(|e| Fault::Header(e.to_string()))?;
+    let header: KnnHeader = serde_json::from_str(json).map_err(|e| Fault::Header(e.to_string()))?;
     let sections = sections(bytes, payload, &header).map_err(Fault::Header)?;
     Ok((header, sections))
 }
@@ -320,21 +360,27 @@ fn sections(bytes: &[u8], payload: usize, header: &KnnHeader) -> Result<Vec<Sect
         }
         let size = k
             .samples
-            .checked_mul(START_BYTES + POSE_BYTES)
+            .checked_mul(START_BYTES + index_bytes(k.poses))
+            .and_then(|n| n.checked_add(k.poses.checked_mul(POSE_BYTES)?))
             .and_then(|n| n.checked_add(4 * (cells + 1)))
             .and_then(|n| n.checked_add(k.manoeuvres.checked_add(1)?.checked_mul(4)?))
             .and_then(|n| n.checked_add(k.segments.checked_mul(SEGMENT_BYTES)?))
             .filter(|n| *n <= bytes.len() - at)
             .ok_or_else(|| format!("{}: {} samples do not fit", k.kind, k.samples))?;
         let starts = at + 4 * (cells + 1);
-        let poses = starts + START_BYTES * k.samples;
-        let segment_begins = poses + POSE_BYTES * k.samples;
+        let which_pose =
+            Indices { begin: starts + START_BYTES * k.samples, bytes: index_bytes(k.poses) };
+        let poses = which_pose.begin + which_pose.bytes * k.samples;
+        let segment_begins = poses + POSE_BYTES * k.poses;
         let segments = segment_begins + 4 * (k.manoeuvres + 1);
-        let section = Section { offsets: at, starts, poses, segment_begins, segments };
+        let section = Section { offsets: at, starts, which_pose, poses, segment_begins, segments };
         let offset = |i: usize| u32_at(bytes, at + 4 * i) as usize;
         let rising = (0..cells).all(|i| offset(i) <= offset(i + 1));
         if offset(0) != 0 || offset(cells) != k.samples || !rising {
             return Err(format!("{}: the offsets of the cells do not rise in order", k.kind));
+        }
+        if !(0..k.samples).all(|i| which_pose.get(bytes, i) < k.poses) {
+            return Err(format!("{}: a sample has a pose beyond the last", k.kind));
         }
         let begin = |i: usize| u32_at(bytes, segment_begins + 4 * i) as usize;
         let rising = (0..k.manoeuvres).all(|i| begin(i) <= begin(i + 1));
@@ -381,6 +427,39 @@ mod tests {
             assert!(signed_angle(fine.heading, p.heading).abs() < 2e-7, "{p:?} {fine:?}");
             let coarse = pose(steps(p, 16.0, START_STEPS), 16.0, START_STEPS);
             assert!(coarse.distance(p) < 4e-4, "{p:?} {coarse:?}");
+        }
+    }
+
+    #[test]
+    fn samples_share_their_poses_whatever_their_number() {
+        for (count, bytes) in [(0, 1), (1, 1), (256, 1), (257, 2), (65_536, 2), (65_537, 3)] {
+            assert_eq!(index_bytes(count), bytes, "{count}");
+        }
+        let header = {
+            let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/knn.bin");
+            let bytes = Cow::Owned(std::fs::read(&shipped).unwrap());
+            KnnFile::new(&shipped, bytes).unwrap().header().clone()
+        };
+        for count in [1, 256, 257, 300] {
+            let pose = |i: usize| Pose::new(0.01 * (i % count) as f64, 1.0, 0.5);
+            let sample =
+                |i: usize| KnnEntry { cell: 0, start: Pose::default(), preparatory: pose(i) };
+            let samples: Vec<_> = (0..1000).map(sample).collect();
+            let kind = KindHeader {
+                samples: samples.len(),
+                manoeuvres: 0,
+                segments: 0,
+                manoeuvres_by_stance: Vec::new(),
+                ..header.kinds[0].clone()
+            };
+            let header = KnnHeader { kinds: vec![kind], ..header.clone() };
+            let entries = KnnEntries { samples, manoeuvres: Vec::new() };
+            let path = Path::new("knn.bin");
+            let file = KnnFile::new(path, Cow::Owned(encode(header, &[entries]))).unwrap();
+            assert_eq!(file.header().kinds[0].poses, count);
+            for i in 0..1000 {
+                assert!(file.preparatory(0, i).distance(pose(i)) < 1.5e-6, "{i} of {count}");
+            }
         }
     }
 

@@ -4,7 +4,7 @@
 //! the two of the paper, [`fleet`] is one for any vehicle; [`by_kind`] joins two of
 //! different parking types. [`foresight`] says what a library's manoeuvres are worth in a scene. [`artefact`] reads and checks their files,
 //! [`model`] tells them apart, [`shipped`] has those compiled in. Read next: [`knn_file`] and
-//! [`network`] for what the files hold, [`mod@crate::n3p`] for the planner that uses a selector.
+//! [`network`] for what the files hold, [`nearest`] for how neighbours are found, [`mod@crate::n3p`] for the planner that uses a selector.
 
 pub mod artefact;
 pub mod by_kind;
@@ -15,6 +15,7 @@ pub mod knn;
 pub mod knn_file;
 pub mod mlp;
 pub mod model;
+pub mod nearest;
 pub mod network;
 mod normaliser;
 pub mod shipped;

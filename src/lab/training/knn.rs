@@ -125,6 +125,7 @@ pub fn train(
             kind,
             cells,
             samples: stored.len(),
+            poses: 0,
             manoeuvres: collected.manoeuvres.len(),
             segments: collected.manoeuvres.iter().map(Vec::len).sum(),
             manoeuvres_by_stance,
@@ -142,9 +143,9 @@ pub fn train(
         seed: metadata.seed,
         crate_version: env!("CARGO_PKG_VERSION").to_owned(),
     };
-    let bytes = knn_file::encode(&header, &entries);
+    let (data_sha256, seed) = (header.data_sha256.clone(), header.seed);
+    let bytes = knn_file::encode(header, &entries);
     artefact::write(out, &bytes)?;
-    let (data_sha256, seed) = (header.data_sha256, header.seed);
     let worlds = config.worlds;
     let log = KnnLog { data_sha256, seed, worlds, heading_radius, bytes: bytes.len(), kinds: logs };
     write_beside(out, &log, card::knn(out, metadata, &log))?;

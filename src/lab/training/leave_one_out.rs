@@ -10,6 +10,7 @@ use super::quality::{Errors, Reach, errors, reach};
 use super::targets::Example;
 use crate::lab::dataset::{Metadata, Sample};
 use crate::selectors::knn::KnnSelector;
+use crate::selectors::nearest;
 
 /// Samples asked for, at most: judging one takes some ten microseconds.
 const MOST: usize = 1000;
@@ -53,7 +54,7 @@ pub(super) fn leave_one_out(
 fn nearest_other(cell: &[&Sample], i: usize, heading_radius: f64) -> usize {
     let point = |j: usize| KnnSelector::point(cell[j].start, heading_radius);
     let asked = point(i);
-    let distance_sq = |j: usize| KnnSelector::distance_sq(&point(j), &asked);
+    let distance_sq = |j: usize| nearest::distance_sq(&point(j), &asked);
     let others = (0..cell.len()).filter(|&j| j != i).map(|j| (distance_sq(j), j));
     others.min_by(|a, b| a.0.total_cmp(&b.0)).expect("a cell with two samples").1
 }

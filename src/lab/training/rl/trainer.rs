@@ -78,7 +78,7 @@ pub fn train(
                 point.losses.entropy,
             );
             bar.set_message(line.clone());
-            tracing::info!("{line}");
+            log::info!("{line}");
         }
     }
     bar.finish_and_clear();
