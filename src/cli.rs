@@ -14,7 +14,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::error::ErrorKind;
-use tracing_subscriber::filter::LevelFilter;
+use log::LevelFilter;
 
 use crate::curves::smoothing::StandstillSteering;
 use crate::files::reason;
@@ -111,12 +111,9 @@ pub fn shape(text: &str) -> Result<f64, String> {
 /// Runs a binary's body and maps its error to stderr and an exit code.
 pub fn run(body: impl FnOnce() -> anyhow::Result<ExitCode>) -> ExitCode {
     let level = std::env::var("N3P_LOG").ok().and_then(|level| level.parse().ok());
-    tracing_subscriber::fmt()
-        .with_max_level(level.unwrap_or(LevelFilter::INFO))
-        .with_writer(std::io::stderr)
-        .with_ansi(false)
-        .with_target(false)
-        .without_time()
+    env_logger::Builder::new()
+        .filter_level(level.unwrap_or(LevelFilter::Info))
+        .format(|line, record| writeln!(line, "{:>5} {}", record.level(), record.args()))
         .init();
     match body() {
         Ok(code) => code,

@@ -210,7 +210,7 @@ mod tests {
         remove_leftovers(dir.path()).unwrap();
         let left = fs::read_dir(dir.path()).unwrap().map(|e| e.unwrap().file_name());
         let mut left: Vec<_> = left.collect();
-        left.sort();
+        left.sort_unstable();
         assert_eq!(left, ["4711", "knn.bin", "mine.tmp"]);
     }
 

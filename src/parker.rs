@@ -236,7 +236,7 @@ impl Parker {
             }
             plans
         });
-        plans.sort_by_key(|(i, _)| *i);
+        plans.sort_unstable_by_key(|(i, _)| *i);
         plans.into_iter().map(|(_, plan)| plan).collect()
     }
 

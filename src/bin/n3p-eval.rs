@@ -239,7 +239,7 @@ fn evaluate(args: &Args) -> Result<ExitCode> {
     rows.extend(new);
     bar.finish_and_clear();
     if !narrow.is_empty() {
-        tracing::warn!(
+        log::warn!(
             "in {} of {} scenes start or goal is nearer to an obstacle than --margin {}: whole \
              paths there may come as near",
             narrow.len(),
@@ -283,7 +283,7 @@ fn choose(args: &Args, vehicle: &Vehicle, methods: &[Method], models: &Models) -
     if let Some(dir) = &args.scenes {
         let terms = args.terms.terms();
         let folder = suite::from_folder(dir, args.kind, terms).or_bad_input()?;
-        folder.unusable.iter().for_each(|line| tracing::warn!("left out: {line}"));
+        folder.unusable.iter().for_each(|line| log::warn!("left out: {line}"));
         let complaint = folder.complaint();
         let left_out = complaint.as_ref().map_or(String::new(), |text| format!("; {text}"));
         let title = format!("{} from {}{left_out}", folder.cases.len(), dir.display());

@@ -214,7 +214,7 @@ fn plan(args: &Args) -> Result<ExitCode> {
     let is_not_smooth = episode.result.outcome.as_ref().err() == Some(&NoPath::NotSmooth);
     let stops = is_not_smooth && args.terms.standstill_steering.is_none();
     if stops {
-        tracing::warn!(
+        log::warn!(
             "no path on which the steering is continuous was found: the car stops to steer on this one"
         );
         let terms = Terms { standstill: StandstillSteering::Anywhere, ..terms };
@@ -223,7 +223,7 @@ fn plan(args: &Args) -> Result<ExitCode> {
     tell(&case.scene, &episode);
     let kept = &episode.problem;
     if kept.margin < args.terms.margin && kept.contact.is_none() {
-        tracing::warn!(
+        log::warn!(
             "start or goal is nearer to an obstacle than --margin {}: the path may come as near as \
              {} m to that obstacle",
             args.terms.margin,
@@ -343,7 +343,7 @@ fn choose(args: &Args, scene: &Scene, problem: &Problem) -> Result<(Method, Mode
         (Ok(()), _) => Ok((method, models)),
         (Err(reason), true) => Err(reason),
         (Err(reason), false) => {
-            tracing::info!("planning with ha-rs: {reason:#}");
+            log::info!("planning with ha-rs: {reason:#}");
             Ok((Method::HA_RS, models))
         }
     }
@@ -354,11 +354,11 @@ fn tell(scene: &Scene, episode: &Episode) {
     for (index, reason) in &episode.passed_over {
         match reason {
             PassedOver::NotFree(ProblemError::GoalInCollision(_, conflict)) => {
-                tracing::warn!("{} is left out: it {conflict}", scene.goal_field(*index));
+                log::warn!("{} is left out: it {conflict}", scene.goal_field(*index));
             }
             // Of a single goal the result says it.
             PassedOver::NoPath(reason) if !scene.goals.is_empty() => {
-                tracing::warn!("{} is left out: {reason}", scene.goal_field(*index));
+                log::warn!("{} is left out: {reason}", scene.goal_field(*index));
             }
             _ => {}
         }
@@ -366,7 +366,7 @@ fn tell(scene: &Scene, episode: &Episode) {
     let Some(path) = &episode.path else { return };
     if !scene.goals.is_empty() {
         let (field, count) = (scene.goal_field(episode.goal_index), scene.goals.len());
-        tracing::info!("the path leads to {field}, the cheapest of {count}");
+        log::info!("the path leads to {field}, the cheapest of {count}");
     }
     if let (Some(end), true) = (path.poses.last(), scene.goal_tolerance.is_some()) {
         let goal = scene.all_goals()[episode.goal_index];
@@ -374,14 +374,14 @@ fn tell(scene: &Scene, episode: &Episode) {
             let end = Pose::from(*end);
             (goal.distance(end), signed_angle(goal.heading, end.heading))
         };
-        tracing::info!("it ends {apart:.3} m and {turn:.4} rad from there, within the tolerance");
+        log::info!("it ends {apart:.3} m and {turn:.4} rad from there, within the tolerance");
     }
     if let Some(contact) = &episode.problem.contact {
         for (what, verb, depth) in
             [("start", "leaves", contact.start_depth), ("goal", "enters", contact.goal_depth)]
         {
             if depth > 0.0 {
-                tracing::warn!(
+                log::warn!(
                     "the {what} reaches {depth:.3} m into an obstacle: the path only {verb} it there"
                 );
             }

@@ -112,7 +112,7 @@ pub fn run(
     if times.is_empty() {
         times.push(first_s);
     }
-    times.sort_by(f64::total_cmp);
+    times.sort_unstable_by(f64::total_cmp);
     let mut row = blank_row(case, planner.name(), times[times.len() / 2]);
     let path = describe(case, goal_index, &problem, &result, (config, judge), &mut row);
     if !repeatable {

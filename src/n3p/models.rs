@@ -234,7 +234,7 @@ impl Models {
                         && model.vehicle().is_some_and(|v| m.vehicle().is_like(v))
                 };
                 if models.vehicles.iter().any(known) {
-                    tracing::warn!("{}: left out: its vehicle has a model", path.display());
+                    log::warn!("{}: left out: its vehicle has a model", path.display());
                 } else {
                     models.add_selector(model)?;
                 }

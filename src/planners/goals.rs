@@ -61,7 +61,7 @@ fn none_free(scene: &Scene, mut errors: Vec<(usize, ProblemError)>) -> ProblemEr
     if scene.goals.is_empty() {
         return errors.remove(0).1;
     }
-    errors.sort_by_key(|(index, _)| *index);
+    errors.sort_unstable_by_key(|(index, _)| *index);
     let field = |(i, error)| (scene.goal_field(i), error);
     ProblemError::NoGoalFree(errors.into_iter().map(field).collect())
 }
@@ -290,7 +290,7 @@ pub fn plan(
     let not_free = errors.into_iter().map(|(index, error)| (index, PassedOver::NotFree(error)));
     let no_path = no_path.into_iter().map(|(index, reason)| (index, PassedOver::NoPath(reason)));
     let mut passed_over: Vec<_> = not_free.chain(no_path).collect();
-    passed_over.sort_by_key(|(index, _)| *index);
+    passed_over.sort_unstable_by_key(|(index, _)| *index);
     Ok(Planned { goal_index, problem, result, passed_over })
 }
 

@@ -170,7 +170,7 @@ impl Draw {
                 let (n, radius) = (self.rng.random_range(3..=7), self.lengths(0.1, 0.6));
                 let mut angles: Vec<f64> =
                     (0..n).map(|_| self.rng.random_range(0.0..TAU)).collect();
-                angles.sort_by(f64::total_cmp);
+                angles.sort_unstable_by(f64::total_cmp);
                 angles.into_iter().map(|a| on_circle(radius, a)).collect()
             }
             Kind::Wall => vec![Vec2::zeros(), Vec2::new(self.lengths(0.2, 3.0), 0.0)],

@@ -109,7 +109,7 @@ pub fn free_spots(scene: &Scene) -> Result<Vec<FreeSpot>, ObstacleError> {
     places.retain(|place| seen.insert(place.key(search.scale)) && search.is_free(place.body));
     if places.len() > MOST_LANES {
         let left_out = places.len() - MOST_LANES;
-        tracing::warn!("{}: {left_out} places beside obstacles are not looked at", scene.name);
+        log::warn!("{}: {left_out} places beside obstacles are not looked at", scene.name);
     }
     let with_lane = places.into_iter().take(MOST_LANES);
     let mut found: Vec<(f64, Place, SpotKind)> =

@@ -163,7 +163,7 @@ impl Scene {
         }
         scene.validate(path)?;
         if let Some(warning) = scene.degrees() {
-            tracing::warn!("{}: {warning}", path.display());
+            log::warn!("{}: {warning}", path.display());
         }
         Ok(scene)
     }
@@ -199,7 +199,7 @@ impl Scene {
                 message: "holds no scene; expected .json or TPCAP .csv files".to_owned(),
             });
         }
-        paths.sort();
+        paths.sort_unstable();
         let mut taken = HashSet::new();
         let mut scenes = Vec::with_capacity(paths.len());
         for path in paths {

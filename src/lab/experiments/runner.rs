@@ -292,7 +292,7 @@ impl Runner<'_> {
         let reports = pool.install(|| collect(config, &folder, kinds, options, &bar))?;
         bar.finish_and_clear();
         for r in &reports {
-            tracing::info!("collect: {}: {} of {} samples solved", r.kind, r.solved, r.rows);
+            log::info!("collect: {}: {} of {} samples solved", r.kind, r.solved, r.rows);
         }
         self.stages.finish("collect", &settings)?;
         Ok(settings)
@@ -324,7 +324,7 @@ impl Runner<'_> {
             }
             let set = self.dataset(read)?;
             let log = training::mlp::train(&set.metadata, &set.samples, kind, mlp, &out)?;
-            tracing::info!(
+            log::info!(
                 "{stage}: best of {} epochs is {}, median error {:.2} m on unseen rows",
                 log.losses.len(),
                 log.best_epoch,
@@ -343,7 +343,7 @@ impl Runner<'_> {
         if self.stages.begin(stage, &settings, out.exists())? != Todo::Nothing {
             let models = training::foresight::load(&[knn]).map_err(ModelsError::from)?;
             let log = training::foresight::train(models, config, &out)?;
-            tracing::info!("{stage}: best of {} epochs is {}", log.losses.len(), log.best_epoch);
+            log::info!("{stage}: best of {} epochs is {}", log.losses.len(), log.best_epoch);
             self.stages.finish(stage, &settings)?;
         }
         Ok(())
@@ -363,7 +363,7 @@ impl Runner<'_> {
                 _ => remove(&checkpoint_path(&out))?,
             }
             let log = training::rl::train(course, config, &out, Begin::Resume, &Device::Cpu)?;
-            tracing::info!("{stage}: the best policy is that of {} episodes", log.best().episodes);
+            log::info!("{stage}: the best policy is that of {} episodes", log.best().episodes);
             remove(&checkpoint_path(&out))?;
             self.stages.finish(&stage, &rl_settings)?;
         }
@@ -393,7 +393,7 @@ impl Runner<'_> {
                 points.extend(known);
                 continue;
             }
-            tracing::info!("{stage}: part {} of {}", i + 1, curve.parts.len());
+            log::info!("{stage}: part {} of {}", i + 1, curve.parts.len());
             self.make_folder(folder.clone())?;
             let new = learning_curve::points(c, curve, self.dataset(read)?, part, &folder)
                 .map_err(|error| ExperimentError::Part { part: i, error: Box::new(error) })?;

@@ -54,7 +54,7 @@ impl Stages {
             _ => Todo::BeginAnew,
         };
         match todo {
-            Todo::Nothing => tracing::info!("{stage}: finished before, nothing to do"),
+            Todo::Nothing => log::info!("{stage}: finished before, nothing to do"),
             _ => self.record(stage, settings, false)?,
         }
         Ok(todo)

@@ -132,7 +132,7 @@ impl Policy for OnnxPolicy {
         observation: &Observation,
         _rng: &mut ChaCha8Rng,
     ) -> Result<Action, PolicyFault> {
-        let warn = |what: String| tracing::warn!("policy {}: {what}", self.path.display());
+        let warn = |what: String| log::warn!("policy {}: {what}", self.path.display());
         match self.run(observation) {
             Ok([steer, speed]) if steer.is_finite() && speed.is_finite() => {
                 Ok(Action { steer: steer.into(), speed: speed.into() })

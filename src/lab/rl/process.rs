@@ -93,7 +93,7 @@ impl Policy for ProcessPolicy {
     ) -> Result<Action, PolicyFault> {
         if observation.step == 0 && self.state.is_err() {
             self.state = Running::spawn(&self.words).map_err(|error| {
-                tracing::warn!("policy `{}`: cannot be started: {}", self.command, reason(&error));
+                log::warn!("policy `{}`: cannot be started: {}", self.command, reason(&error));
                 PolicyFault::Ended
             });
         }
@@ -104,7 +104,7 @@ impl Policy for ProcessPolicy {
         };
         let what = if fault == PolicyFault::Ended { running.end() } else { what };
         let (command, step) = (&self.command, observation.step);
-        tracing::warn!("policy `{command}`, step {step}: {what}; the next episode restarts it");
+        log::warn!("policy `{command}`, step {step}: {what}; the next episode restarts it");
         self.state = Err(fault);
         Err(fault)
     }

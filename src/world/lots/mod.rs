@@ -217,7 +217,7 @@ mod tests {
         {
             assert!((30..270).contains(&share), "{name}: {share}");
         }
-        sizes.sort_by(f64::total_cmp);
+        sizes.sort_unstable_by(f64::total_cmp);
         assert!(sizes[sizes.len() / 10] < 4.0 && sizes[sizes.len() * 9 / 10] > 4.8);
     }
 }

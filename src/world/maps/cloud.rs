@@ -46,7 +46,7 @@ impl Cloud {
             );
         }
         if self.not_finite > 0 {
-            tracing::warn!(
+            log::warn!(
                 "{}: {} points that are not finite are passed over",
                 file.path.display(),
                 self.not_finite
@@ -63,7 +63,7 @@ impl Cloud {
             return Err(file.format(format!("has no point {why}")));
         }
         if has_z && !is_limited && self.seen[1] - self.seen[0] > 0.05 {
-            tracing::info!(
+            log::info!(
                 "{}: heights from {} to {} m all count as obstacles; limit them (--z-min, --z-max) if the ground is among them",
                 file.path.display(),
                 self.seen[0],

@@ -46,11 +46,11 @@ pub(super) fn read(
         .sum::<usize>()
         + all().filter(|o| !is_static(o)).count();
     if moving > 0 {
-        tracing::warn!("{}: {moving} moving obstacles are left out", file.path.display());
+        log::warn!("{}: {moving} moving obstacles are left out", file.path.display());
     }
     let lanelets = children(root, "lanelet").count();
     if lanelets > 0 && !options.borders && map.obstacles.is_empty() {
-        tracing::info!(
+        log::info!(
             "{}: nothing stands beside its {lanelets} lanelets; take their borders for walls with --borders",
             file.path.display()
         );
@@ -65,10 +65,7 @@ pub(super) fn read(
     }
     let problems = children(root, "planningProblem").count();
     if problems > 1 {
-        tracing::warn!(
-            "{}: of {problems} planning problems the first is taken",
-            file.path.display()
-        );
+        log::warn!("{}: of {problems} planning problems the first is taken", file.path.display());
     }
     if let Some(problem) = child(root, "planningProblem") {
         reader.problem(problem, &mut map)?;
@@ -210,7 +207,7 @@ impl Reader<'_> {
         };
         for goal in children(problem, "goalState") {
             let Some(position) = child(goal, "position") else {
-                tracing::warn!(
+                log::warn!(
                     "{}: a goal without a position is left out: it says only when to arrive or how fast",
                     self.file.path.display()
                 );
@@ -265,7 +262,7 @@ impl Reader<'_> {
                 "point" => {
                     regions.push(Region { middle: self.point(shape)?, radius: 0.0, heading: None });
                 }
-                "lanelet" => tracing::warn!(
+                "lanelet" => log::warn!(
                     "{}: a goal that is a lanelet is left out: it does not say where to stand",
                     self.file.path.display()
                 ),

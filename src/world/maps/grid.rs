@@ -86,7 +86,7 @@ pub(super) fn read(text: &str, options: &MapOptions, file: MapFile) -> Result<Ma
     };
     let cells = Cells::read(bytes, is_blocked).map_err(unusable)?;
     if is_seen_through.get() {
-        tracing::warn!(
+        log::warn!(
             "{}: transparent pixels of {image} count as occupied, as map servers take them; with mode: scale they are unknown",
             file.path.display()
         );

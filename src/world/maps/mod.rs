@@ -272,7 +272,7 @@ impl Map {
         };
         scene.validate(&self.path)?;
         if let Some(warning) = scene.degrees() {
-            tracing::warn!("{}: {warning}", self.path.display());
+            log::warn!("{}: {warning}", self.path.display());
         }
         Ok(scene)
     }
