@@ -200,6 +200,7 @@ pub enum Fate {
 /// Looks plans up; buffers and the table of estimates are reused.
 #[derive(Debug, Default)]
 pub struct LibrarySearch {
+    /// What is not tried yet, once it is asked for in order.
     queue: BinaryHeap<Reverse<Candidate>>,
     /// The candidates that are free, in the order they were checked.
     free: Vec<Candidate>,
@@ -220,6 +221,9 @@ pub struct LookUp<'a> {
     /// Where the manoeuvres end.
     end: Pose,
     model: &'a CostModel,
+    /// What is estimated to cost as much is not tried.
+    bound: f64,
+    is_queued: bool,
 }
 
 /// A manoeuvre and its estimated cost, ordered by cost, then by index: the bits of the cost above
@@ -277,19 +281,10 @@ impl LibrarySearch {
         debug_assert!(library.fits(problem));
         let seen = problem.start.relative(end);
         let mut begins = self.approaches.view(&library.begins, seen, &problem.vehicle, model);
-        let mut queue = std::mem::take(&mut self.queue).into_vec();
-        queue.clear();
         self.estimates.clear();
-        for index in 0..library.len() {
-            let estimate = begins.cost(index);
-            self.estimates.push(estimate);
-            if f64::from(estimate) < bound {
-                queue.push(Reverse(Candidate::new(estimate, index)));
-            }
-        }
-        self.queue = BinaryHeap::from(queue);
+        self.estimates.extend((0..library.len()).map(|index| begins.cost(index)));
         self.free.clear();
-        LookUp { search: self, library, verdicts, problem, end, model }
+        LookUp { search: self, library, verdicts, problem, end, model, bound, is_queued: false }
     }
 
     /// The first plan of `problem`, in order of estimated cost, that is free and costs less
@@ -351,6 +346,7 @@ impl LookUp<'_> {
     /// What plans by the manoeuvres cost that are free and joined by a free curve, and no more than so many
     /// `times` the cheapest.
     pub fn costs_within(&mut self, times: f64) -> Vec<(usize, f64)> {
+        self.queue();
         let (mut costs, mut bound) = (Vec::new(), f64::INFINITY);
         while let Some(Reverse(candidate)) = self.search.queue.pop() {
             if candidate.estimate() >= bound {
@@ -367,21 +363,31 @@ impl LookUp<'_> {
         costs
     }
 
-    /// The least estimate of the first `count` manoeuvres and of the others, of those that were not
-    /// looked at yet, free or not.
+    /// The least estimate of the first `count` manoeuvres and of the others, free or not.
     pub fn least_estimates(&self, count: usize) -> (f64, f64) {
-        let (mut first, mut others) = (f64::INFINITY, f64::INFINITY);
-        for Reverse(candidate) in &self.search.queue {
-            let least = if candidate.index() < count { &mut first } else { &mut others };
-            *least = least.min(candidate.estimate());
+        let (first, others) = self.search.estimates.split_at(count.min(self.library.len()));
+        let least = |all: &[f32]| f64::from(all.iter().copied().fold(f32::INFINITY, f32::min));
+        (least(first), least(others))
+    }
+
+    /// Puts what may be tried into order, unless that was done.
+    fn queue(&mut self) {
+        if std::mem::replace(&mut self.is_queued, true) {
+            return;
         }
-        (first, others)
+        let LibrarySearch { queue, estimates, .. } = &mut *self.search;
+        let mut all = std::mem::take(queue).into_vec();
+        all.clear();
+        let within = estimates.iter().enumerate().filter(|(_, e)| f64::from(**e) < self.bound);
+        all.extend(within.map(|(index, estimate)| Reverse(Candidate::new(*estimate, index))));
+        *queue = BinaryHeap::from(all);
     }
 
     /// The next plan in order of estimated cost that is free, costs less than `bound` and little
     /// more than estimated. Gives up after `tries` free manoeuvres that cannot be joined like that;
     /// when called again it goes on from there.
     pub fn next(&mut self, bound: f64, tries: usize) -> Option<LibraryPlan> {
+        self.queue();
         let last = self.search.free.len().saturating_add(tries);
         while self.search.free.len() < last {
             let &Reverse(candidate) = self.search.queue.peek()?;

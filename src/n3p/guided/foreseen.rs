@@ -35,14 +35,15 @@ impl Ranking {
         let Self { outlook, scores, order } = self;
         codes.scores(outlook, estimates, scores);
         order.clear();
-        let score = |index: u32| scores[index as usize];
-        for index in 0..scores.len() as u32 {
-            if order.len() == PROMISING && score(index) <= score(order[PROMISING - 1]) {
+        let (score, mut least) = (|index: u32| scores[index as usize], f32::NEG_INFINITY);
+        for (index, &own) in (0..).zip(scores.iter()) {
+            if order.len() == PROMISING && own <= least {
                 continue;
             }
             order.truncate(PROMISING - 1);
-            let at = order.partition_point(|&better| score(better) >= score(index));
+            let at = order.partition_point(|&better| score(better) >= own);
             order.insert(at, index);
+            least = score(order[order.len() - 1]);
         }
         order
     }

@@ -327,12 +327,12 @@ impl GuidedPlanner {
     /// estimate. With the usual changes of gear that is much, since manoeuvres for them were learnt in many worlds; by an
     /// unusual spot it is at most twice the estimate.
     pub(super) fn is_usual(&mut self, known: &Known, standard: &mut Standard) -> bool {
-        if known.cost <= standard.enough(&mut self.hars) {
+        // The library's estimate is at hand, the other one takes a tenth of a plan.
+        if known.cost <= USUAL * known.least || known.cost <= standard.enough(&mut self.hars) {
             return true;
         }
         let times = known.cost / known.least.max(standard.least(&mut self.hars));
         let trust = match known.is_as_foreseen() {
-            _ if known.cost <= USUAL * known.least => return true,
             Some(false) => return false,
             Some(true) => TRUSTED,
             None => 1.0,

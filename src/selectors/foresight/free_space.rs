@@ -69,16 +69,20 @@ fn in_intervals(count: usize, a: Vec2, b: Vec2, mut visit: impl FnMut(usize, f64
     if b.x < 0.0 || a.x >= count as f64 {
         return;
     }
+    let is_upright = b.x - a.x < 1e-9;
     let slope = (b.y - a.y) / (b.x - a.x).max(1e-9);
     let [low, high] = [a.y.min(b.y), a.y.max(b.y)];
-    let last = (b.x as usize).min(count - 1);
-    for i in a.x.max(0.0) as usize..=last {
-        let y = |x: f64| (a.y + slope * (x.clamp(a.x, b.x) - a.x)).clamp(low, high);
-        let [from, to] = match i {
-            _ if b.x - a.x < 1e-9 => [low, high],
-            _ => [y(i as f64), y(i as f64 + 1.0)],
-        };
-        visit(i, from.min(to), from.max(to));
+    let y = |x: f64| (a.y + slope * (x - a.x)).clamp(low, high);
+    let (first, last) = (a.x.max(0.0) as usize, (b.x as usize).min(count - 1));
+    let mut from = y(a.x.max(first as f64));
+    for i in first..=last {
+        if is_upright {
+            visit(i, low, high);
+        } else {
+            let to = y(b.x.min(i as f64 + 1.0));
+            visit(i, from.min(to), from.max(to));
+            from = to;
+        }
     }
 }
 
