@@ -66,7 +66,7 @@ impl<'a> Nearness<'a> {
             let half = Segment { length: s.length / 2.0, ..s };
             let middle = half.end(from);
             self.is_on_the_way(middle)
-                && !(collision.is_free_of(&self.footprint, middle)
+                && !(self.is_clear(middle)
                     && collision
                         .is_swept_free(&BodyFrame::new(middle), &Sweep::new(&self.footprint, half)))
         };
@@ -92,13 +92,21 @@ impl<'a> Nearness<'a> {
 
     /// What one motion costs more for being near.
     pub fn of_motion(&self, from: Pose, segment: Segment) -> f64 {
-        if self.weight == 0.0 { 0.0 } else { self.weight * self.near_metres(from, segment) }
+        if self.weight == 0.0 {
+            return 0.0;
+        }
+        self.weight * self.near_metres(from, self.is_clear(from), segment)
     }
 
-    fn near_metres(&self, from: Pose, segment: Segment) -> f64 {
+    fn is_clear(&self, at: Pose) -> bool {
+        self.problem.collision.is_free_of(&self.footprint, at)
+    }
+
+    /// Metres of a motion with something near; `is_clear`: whether nothing is where it begins.
+    fn near_metres(&self, from: Pose, is_clear: bool, segment: Segment) -> f64 {
         let world = &self.problem.collision;
         let length = segment.length.abs();
-        let is_free = world.is_free_of(&self.footprint, from)
+        let is_free = is_clear
             && world.is_swept_free(&BodyFrame::new(from), &Sweep::new(&self.footprint, segment));
         if is_free {
             return 0.0;
@@ -108,7 +116,9 @@ impl<'a> Nearness<'a> {
             return if self.is_given(middle) { 0.0 } else { length };
         }
         let half = Segment { length: segment.length / 2.0, ..segment };
-        self.near_metres(from, half) + self.near_metres(half.end(from), half)
+        let middle = half.end(from);
+        self.near_metres(from, is_clear, half)
+            + self.near_metres(middle, self.is_clear(middle), half)
     }
 
     /// Whether a pose is so close to start or goal that its distances are theirs.
