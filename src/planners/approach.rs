@@ -34,8 +34,8 @@ pub(super) struct Poses {
     /// Headings in steps of the table.
     turn: Vec<f32>,
     cost: Vec<f32>,
-    /// The gear of going on: which of the tables.
-    gear: Vec<u8>,
+    /// Where the table of the gear of going on begins.
+    table: Vec<u32>,
 }
 
 impl Poses {
@@ -44,7 +44,42 @@ impl Poses {
         self.y.push(pose.y as f32);
         self.turn.push(steps(pose.heading));
         self.cost.push(cost as f32);
-        self.gear.push(GEARS.iter().position(|g| *g == gear).unwrap_or(0) as u8);
+        let table = GEARS.iter().position(|g| *g == gear).unwrap_or(0);
+        self.table.push((table * ENTRIES) as u32);
+    }
+
+    /// The entries of the tables where the poses are seen whose frame lies at `frame`, beyond the last where no
+    /// table reaches. `step`: metres in a step of a table.
+    fn seen_from(&self, frame: Pose, step: f64, entries: &mut Vec<u32>) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.seen_from_avx2(frame, step, entries) };
+        }
+        self.seen_from_plain(frame, step, entries);
+    }
+
+    /// The same loop compiled for eight numbers per register.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn seen_from_avx2(&self, frame: Pose, step: f64, entries: &mut Vec<u32>) {
+        self.seen_from_plain(frame, step, entries);
+    }
+
+    #[inline(always)]
+    fn seen_from_plain(&self, frame: Pose, step: f64, entries: &mut Vec<u32>) {
+        let (sin, cos) = frame.sin_cos();
+        let (sin, cos) = (sin as f32, cos as f32);
+        let per_metre = (1.0 / step) as f32;
+        let (at_x, at_y) = ((frame.x / step) as f32, (frame.y / step) as f32);
+        let (sin, cos, turned) = (sin * per_metre, cos * per_metre, steps(frame.heading));
+        let columns = self.x.iter().zip(&self.y).zip(&self.turn).zip(&self.table);
+        entries.clear();
+        entries.extend(columns.map(|(((x, y), turn), table)| {
+            let seen_y = at_y + sin * x + cos * y;
+            let side = 1.0_f32.copysign(seen_y);
+            table + entry(at_x + cos * x - sin * y, side * seen_y, side * (turned + turn))
+        }));
     }
 }
 
@@ -57,91 +92,60 @@ pub(super) struct Approaches {
     entries: Vec<u32>,
 }
 
-/// Poses as they are seen from one start.
-pub(super) struct View<'a> {
-    poses: &'a Poses,
-    /// The frame of the poses.
-    frame: Pose,
-    vehicle: &'a Vehicle,
-    /// Metres in a step of the table.
-    step: f64,
-    model: &'a CostModel,
-    /// By pose: its entry in the table, beyond its end where the table does not reach.
-    entries: &'a [u32],
-    table: &'a mut [f32],
-    words: &'a mut Vec<Word>,
-}
-
 impl Approaches {
-    /// Sees `poses`, given in a frame that lies at `frame`, from the origin.
-    pub fn view<'a>(
-        &'a mut self,
-        poses: &'a Poses,
+    /// Estimates what it costs to come from the origin to each of the `poses`, whose frame lies at `frame`, and
+    /// to go on from there.
+    pub fn costs(
+        &mut self,
+        poses: &Poses,
         frame: Pose,
-        vehicle: &'a Vehicle,
-        model: &'a CostModel,
-    ) -> View<'a> {
+        vehicle: &Vehicle,
+        model: &CostModel,
+        costs: &mut Vec<f32>,
+    ) {
         if self.made_for != Some((*vehicle, *model)) {
             self.made_for = Some((*vehicle, *model));
             self.table.clear();
             self.table.resize(GEARS.len() * ENTRIES, f32::NAN);
         }
-        let (sin, cos) = frame.sin_cos();
-        let (sin, cos) = (sin as f32, cos as f32);
         let step = vehicle.scale();
-        let per_metre = (1.0 / step) as f32;
-        let (at_x, at_y) = ((frame.x / step) as f32, (frame.y / step) as f32);
-        let (sin, cos, turned) = (sin * per_metre, cos * per_metre, steps(frame.heading));
-        let columns = poses.x.iter().zip(&poses.y).zip(&poses.turn);
-        self.entries.clear();
-        self.entries.extend(columns.map(|((x, y), turn)| {
-            let seen_y = at_y + sin * x + cos * y;
-            let side = 1.0_f32.copysign(seen_y);
-            entry(at_x + cos * x - sin * y, side * seen_y, side * (turned + turn))
-        }));
-        let Self { table, words, entries, .. } = self;
-        View { poses, frame, vehicle, step, model, entries, table, words }
+        poses.seen_from(frame, step, &mut self.entries);
+        let stored = |entry: &u32| self.table.get(*entry as usize).copied().unwrap_or(f32::NAN);
+        costs.clear();
+        costs.extend(self.entries.iter().zip(&poses.cost).map(|(e, cost)| cost + stored(e)));
+        for (index, cost) in costs.iter_mut().enumerate().filter(|(_, cost)| cost.is_nan()) {
+            let (table, from) = (poses.table[index] as usize, Pose::default());
+            let gear = GEARS[table / ENTRIES];
+            let mut least = |to| {
+                least_curve_cost_before(gear, from, to, vehicle, model, &mut self.words) as f32
+            };
+            let at = self.entries[index] as usize;
+            let approach = match self.table.get_mut(at) {
+                Some(stored) if stored.is_nan() => {
+                    *stored = least(middle(at - table, step));
+                    *stored
+                }
+                Some(stored) => *stored,
+                None => {
+                    let [x, y, turn] = [&poses.x, &poses.y, &poses.turn].map(|v| v[index]);
+                    let heading = f64::from(turn / HEADINGS) * TAU;
+                    least(frame.compose(Pose::new(x.into(), y.into(), heading)))
+                }
+            };
+            *cost = poses.cost[index] + approach;
+        }
     }
 }
 
-impl View<'_> {
-    /// Estimated cost from the start by way of pose `index`.
-    #[inline]
-    pub fn cost(&mut self, index: usize) -> f32 {
-        let entry = self.entries[index] as usize;
-        let stored = if entry < ENTRIES { self.table[self.at(index)] } else { f32::NAN };
-        let approach = if stored.is_nan() { self.compute(index) } else { stored };
-        self.poses.cost[index] + approach
-    }
-
-    /// Where the table of the pose's gear has its bin.
-    #[inline]
-    fn at(&self, index: usize) -> usize {
-        usize::from(self.poses.gear[index]) * ENTRIES + self.entries[index] as usize
-    }
-
-    /// The least cost to the middle of the pose's bin, which is kept, or to a far pose.
-    #[cold]
-    fn compute(&mut self, index: usize) -> f32 {
-        let (entry, at) = (self.entries[index] as usize, self.at(index));
-        let Poses { x, y, turn, gear, .. } = self.poses;
-        let (gear, from) = (GEARS[usize::from(gear[index])], Pose::default());
-        let mut least = |to| {
-            least_curve_cost_before(gear, from, to, self.vehicle, self.model, self.words) as f32
-        };
-        if entry >= ENTRIES {
-            let heading = f64::from(turn[index] / HEADINGS) * TAU;
-            return least(self.frame.compose(Pose::new(x[index].into(), y[index].into(), heading)));
-        }
-        let (headings, side) = (HEADINGS as usize, SIDE as usize);
-        let position = entry / headings;
-        self.table[at] = least(Pose::new(
-            ((position % side) as f64 - f64::from(REACH)) * self.step,
-            (position / side) as f64 * self.step,
-            (entry % headings) as f64 / headings as f64 * TAU,
-        ));
-        self.table[at]
-    }
+/// The middle of a bin of the table.
+fn middle(entry: usize, step: f64) -> Pose {
+    let (headings, side) = (HEADINGS as usize, SIDE as usize);
+    let position = entry / headings;
+    Pose::new(
+        ((position % side) as f64 - f64::from(REACH)) * step,
+        (position / side) as f64 * step,
+        (entry % headings) as f64 / headings as f64 * TAU,
+    )
 }
 
 /// `heading` in steps of the table, from 0 to less than [`HEADINGS`].
@@ -199,7 +203,10 @@ mod tests {
             let mut poses = Poses::default();
             let gear = |i: usize| GEARS[i % GEARS.len()];
             (0..).zip(&given).for_each(|(i, &p)| poses.push(p, 1.0, gear(i)));
-            let mut view = approaches.view(&poses, frame, &vehicle, &model);
+            let mut all = [Vec::new(), Vec::new()];
+            for costs in &mut all {
+                approaches.costs(&poses, frame, &vehicle, &model, costs);
+            }
             for (i, &pose) in given.iter().enumerate() {
                 let p = frame.compose(pose);
                 let step = TAU / 24.0;
@@ -212,8 +219,8 @@ mod tests {
                 let inside = middle.x.abs() <= 32.0 && middle.y.abs() <= 32.0;
                 *(if inside { &mut near } else { &mut far }) += 1;
                 let expected = 1.0 + cost(gear(i), if inside { middle } else { p });
-                for _ in 0..2 {
-                    let got = f64::from(view.cost(i));
+                for costs in &all {
+                    let got = f64::from(costs[i]);
                     assert!((got - expected).abs() < 1e-3, "{p:?}: {got}, not {expected}");
                 }
             }

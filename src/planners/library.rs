@@ -280,9 +280,8 @@ impl LibrarySearch {
     ) -> LookUp<'a> {
         debug_assert!(library.fits(problem));
         let seen = problem.start.relative(end);
-        let mut begins = self.approaches.view(&library.begins, seen, &problem.vehicle, model);
-        self.estimates.clear();
-        self.estimates.extend((0..library.len()).map(|index| begins.cost(index)));
+        let (begins, costs) = (&library.begins, &mut self.estimates);
+        self.approaches.costs(begins, seen, &problem.vehicle, model, costs);
         self.free.clear();
         LookUp { search: self, library, verdicts, problem, end, model, bound, is_queued: false }
     }
