@@ -211,11 +211,11 @@ impl GuidedPlanner {
         effort: Effort,
         left: &mut usize,
     ) -> Result<(Path, Guidance), NoPath> {
-        let mut goal = self.hars.goal_set(problem);
         let has_library = config.library && self.prepare_library(problem);
-        if has_library && let Some(known) = self.look_up(problem, &goal) {
-            return Ok(self.settle(problem, &goal, known, effort, left));
+        if has_library && let Some(known) = self.look_up(problem) {
+            return Ok(self.settle(problem, known, effort, left));
         }
+        let mut goal = self.hars.goal_set(problem);
         for found in self.cells(problem).iter().take(config.abstractions) {
             self.select(problem, found, config.candidates);
             let of_cell = self.hars.goal_set_of_cell(problem, found.shift);
@@ -238,10 +238,9 @@ impl GuidedPlanner {
             && let Some(leg) = self.hars.direct(problem, problem.start, untried)
         {
             let guidance = guidance(untried.entries().get(leg.entry), Route::Direct);
-            let plain = self.hars.goal_set(problem);
             let known =
                 Known { path: leg.path, cost: leg.cost, guidance, least: 0.0, foreseen: None };
-            return Ok(self.settle(problem, &plain, known, effort, left));
+            return Ok(self.settle(problem, known, effort, left));
         }
         // One search: it begins at the goal and at every preparatory pose.
         let before = *left;
@@ -259,7 +258,6 @@ impl GuidedPlanner {
     fn settle(
         &mut self,
         problem: &Problem,
-        goal: &GoalSet,
         mut known: Known,
         effort: Effort,
         left: &mut usize,
@@ -267,7 +265,7 @@ impl GuidedPlanner {
         if effort == Effort::First {
             return (known.path, known.guidance);
         }
-        let mut standard = Standard::new(problem, goal);
+        let mut standard = Standard::new(problem);
         let mut is_usual = self.is_usual(&known, &mut standard);
         let apart = problem.start.distance(problem.goal) / problem.vehicle.length;
         let may_go_on = problem.starts_at_the_spot() || (apart < NEAR_GOAL && !is_usual);
@@ -285,7 +283,8 @@ impl GuidedPlanner {
         }
         let Known { path, mut guidance, least, foreseen, .. } = known;
         let before = *left;
-        let mut refined = self.hars.refine(problem, goal, path.clone(), Effort::Usual, None, left);
+        let goal = standard.goal(&self.hars).clone();
+        let mut refined = self.hars.refine(problem, &goal, path.clone(), Effort::Usual, None, left);
         let cost = self.path_cost(problem, &refined);
         let limit = foreseen.map_or(DEAR_BY_UNUSUAL * least, |f| FAR_FROM_FORESEEN * f);
         let is_dear = cost > limit
@@ -294,9 +293,9 @@ impl GuidedPlanner {
         let doubtful =
             refined.direction_changes() > most_changes(problem.kind) && cost > DOUBTFUL * least;
         if is_dear {
-            refined = self.or_searched(problem, goal, refined, UNUSUAL_SEARCH, false, left);
+            refined = self.or_searched(problem, &goal, refined, UNUSUAL_SEARCH, false, left);
         } else if doubtful {
-            refined = self.or_searched(problem, goal, refined, SECOND_SEARCH, false, left);
+            refined = self.or_searched(problem, &goal, refined, SECOND_SEARCH, false, left);
         }
         if refined != path {
             guidance = Self::anew(before - *left);
@@ -365,7 +364,7 @@ impl GuidedPlanner {
     ) -> Path {
         let refined = self.hars.refine(problem, goal, path, effort, Some(spent), left);
         let is_fine = refined.direction_changes() <= most_changes(problem.kind);
-        if effort == Effort::First || is_fine || !Standard::new(problem, goal).is_unusual() {
+        if effort == Effort::First || is_fine || !Standard::new(problem).is_unusual() {
             return refined;
         }
         self.or_searched(problem, goal, refined, UNUSUAL_SEARCH, true, left)

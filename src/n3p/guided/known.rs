@@ -1,5 +1,6 @@
 //! What `n3p` knows without a search: the manoeuvres of its library, and what they say about a plan.
 
+use std::cell::OnceCell;
 use std::sync::OnceLock;
 
 use super::GuidedPlanner;
@@ -120,20 +121,25 @@ impl Prepared {
 /// What plans of one problem are held against, found out once, where it is asked for.
 pub(super) struct Standard<'a> {
     problem: &'a Problem,
-    goal: &'a GoalSet,
+    goal: OnceCell<GoalSet>,
     least: Option<f64>,
     unusual: Option<bool>,
 }
 
 impl<'a> Standard<'a> {
-    pub(super) fn new(problem: &'a Problem, goal: &'a GoalSet) -> Self {
-        Self { problem, goal, least: None, unusual: None }
+    pub(super) fn new(problem: &'a Problem) -> Self {
+        Self { problem, goal: OnceCell::new(), least: None, unusual: None }
+    }
+
+    /// Where plans may end.
+    pub(super) fn goal(&self, hars: &HybridAStar) -> &GoalSet {
+        self.goal.get_or_init(|| hars.goal_set(self.problem))
     }
 
     /// The least cost through empty space.
     fn least(&mut self, hars: &mut HybridAStar) -> f64 {
-        let Self { problem, goal, .. } = *self;
-        *self.least.get_or_insert_with(|| hars.lower_bound(problem, goal))
+        let goal = self.goal.get_or_init(|| hars.goal_set(self.problem));
+        *self.least.get_or_insert_with(|| hars.lower_bound(self.problem, goal))
     }
 
     /// Cost that any plan may have: little more than the least through empty space.
@@ -209,13 +215,13 @@ pub(super) fn most_changes(kind: Option<ParkingType>) -> usize {
 
 impl GuidedPlanner {
     /// The cheapest of what is known without a search, as foreseen, or else as estimates say.
-    pub(super) fn look_up(&mut self, problem: &Problem, goal: &GoalSet) -> Option<Known> {
-        self.look_ahead(problem).or_else(|| self.by_estimates(problem, goal))
+    pub(super) fn look_up(&mut self, problem: &Problem) -> Option<Known> {
+        self.look_ahead(problem).or_else(|| self.by_estimates(problem))
     }
 
     /// The cheapest of what is known without a search: manoeuvres of the library prepared last, and
     /// the curve straight to the goal where none of the first can be joined.
-    fn by_estimates(&mut self, problem: &Problem, goal: &GoalSet) -> Option<Known> {
+    fn by_estimates(&mut self, problem: &Problem) -> Option<Known> {
         let Self { libraries, library_search, verdicts, hars, .. } = self;
         let cost = hars.cost(&problem.vehicle);
         let prepared = &libraries[0];
@@ -228,7 +234,7 @@ impl GuidedPlanner {
         let mut best = look_up.next(any, FIRST_TRIES).map(by_manoeuvre);
         if best.is_none() {
             let guidance = Guidance { preparatory: None, route: Route::Direct };
-            let direct = hars.direct(problem, problem.start, goal);
+            let direct = hars.direct(problem, problem.start, &hars.goal_set(problem));
             let known =
                 |Leg { path, cost, .. }| Known { path, cost, guidance, least, foreseen: None };
             let direct = direct.map(known);

@@ -71,19 +71,34 @@ fn in_intervals(count: usize, a: Vec2, b: Vec2, mut visit: impl FnMut(usize, f64
     }
     let is_upright = b.x - a.x < 1e-9;
     let slope = (b.y - a.y) / (b.x - a.x).max(1e-9);
-    let [low, high] = [a.y.min(b.y), a.y.max(b.y)];
-    let y = |x: f64| (a.y + slope * (x - a.x)).clamp(low, high);
-    let (first, last) = (a.x.max(0.0) as usize, (b.x as usize).min(count - 1));
-    let mut from = y(a.x.max(first as f64));
+    let (low, high) = sorted(a.y, b.y);
+    let y = |x: f64| lesser(greater(a.y + slope * (x - a.x), low), high);
+    let (first, last) = (greater(a.x, 0.0) as usize, (b.x as usize).min(count - 1));
+    let mut from = y(greater(a.x, first as f64));
     for i in first..=last {
         if is_upright {
             visit(i, low, high);
         } else {
-            let to = y(b.x.min(i as f64 + 1.0));
-            visit(i, from.min(to), from.max(to));
+            let to = y(lesser(b.x, i as f64 + 1.0));
+            let (least, most) = sorted(from, to);
+            visit(i, least, most);
             from = to;
         }
     }
+}
+
+// One instruction each, where `f64::min` and `f64::max` have to look for what is not a number.
+
+fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+fn greater(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+fn sorted(a: f64, b: f64) -> (f64, f64) {
+    (lesser(a, b), greater(a, b))
 }
 
 /// The edge `a`–`b` strip by strip: its smallest and largest distance above the lane's middle.
@@ -103,18 +118,18 @@ pub(super) fn free_space(problem: &Problem, stance: Stance) -> [f32; FREE] {
     problem.collision.edges_near(&near, |a, b| {
         in_strips(layout.in_lane(a), layout.in_lane(b), |i, low, high| {
             if low >= 0.0 {
-                above[i] = above[i].min(low);
+                above[i] = lesser(above[i], low);
             } else if high <= 0.0 {
-                below[i] = below[i].max(high);
+                below[i] = greater(below[i], high);
             } else {
                 (above[i], below[i]) = (0.0, 0.0);
             }
         });
         in_intervals(ROWS, layout.in_spot(a), layout.in_spot(b), |i, low, high| {
             if low >= 0.0 {
-                right[i] = right[i].min(low);
+                right[i] = lesser(right[i], low);
             } else if high <= 0.0 {
-                left[i] = left[i].max(high);
+                left[i] = greater(left[i], high);
             }
         });
     });
@@ -130,8 +145,8 @@ pub(super) fn swept(stance: Stance, vehicle: &Vehicle, motions: &[Segment]) -> [
         let corners = body.map(|c| layout.in_lane(pose.point_to_parent(c)));
         for i in 0..4 {
             in_strips(corners[i], corners[(i + 1) % 4], |i, low, high| {
-                above[i] = above[i].max(high.min(FAR));
-                below[i] = below[i].min(low.max(-FAR));
+                above[i] = greater(above[i], lesser(high, FAR));
+                below[i] = lesser(below[i], greater(low, -FAR));
             });
         }
     };
