@@ -7,6 +7,8 @@ use crate::selectors::foresight::{Codes, Outlook};
 
 /// So many of the most promising manoeuvres are tried.
 const PROMISING: usize = 16;
+/// What costs so many times what is foreseen is taken at once: the network errs by as much (its card).
+const AT_ONCE: f64 = 1.02;
 /// A plan will do that costs at most so many times what is foreseen; one that costs so many times as much
 /// is searched for once more. Both chosen in the world "wide", seed 92.
 const WILL_DO: f64 = 1.2;
@@ -69,7 +71,7 @@ impl GuidedPlanner {
         ranking.outlook = foresight.look(problem, prepared.stance, [estimates.0, estimates.1]);
         let foreseen = ranking.outlook.cost;
         let order = ranking.order(codes, look_up.estimates());
-        let first = look_up.promising(order, any, foreseen);
+        let first = look_up.promising(order, any, AT_ONCE * foreseen);
         let mut best = first.map(|plan| prepared.known(plan, least));
         // Where that is far above what estimates say these have a say, too: elsewhere than where it has
         // learnt the network errs.
@@ -86,7 +88,7 @@ impl GuidedPlanner {
                 of_rare.get_or_init(|| foresight.codes(&prepared.values(rare, &problem.vehicle)));
             let mut look_up = library_search.look_up(rare, verdicts, problem, &cost, bound);
             let order = ranking.order(codes, look_up.estimates());
-            if let Some(plan) = look_up.promising(order, bound, foreseen) {
+            if let Some(plan) = look_up.promising(order, bound, AT_ONCE * foreseen) {
                 best = Some(rarely_used(plan, least));
             }
         }
