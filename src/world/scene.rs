@@ -68,7 +68,7 @@ pub struct Scene {
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
     /// The file or folder cannot be read.
-    #[error("{path}: cannot be read: {}", reason(error))]
+    #[error("{path}: cannot read it: {}", reason(error))]
     Read {
         /// The file or folder.
         path: PathBuf,
