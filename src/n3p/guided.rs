@@ -212,7 +212,7 @@ impl GuidedPlanner {
         left: &mut usize,
     ) -> Result<(Path, Guidance), NoPath> {
         let has_library = config.library && self.prepare_library(problem);
-        if has_library && let Some(known) = self.look_up(problem) {
+        if has_library && let Some(known) = self.look_up(problem).or_else(|| self.by_way(problem)) {
             return Ok(self.settle(problem, known, effort, left));
         }
         let mut goal = self.hars.goal_set(problem);
@@ -281,17 +281,21 @@ impl GuidedPlanner {
         if is_usual && !self.hars.passes_near(problem, &known.path) {
             return (known.path, known.guidance);
         }
+        if !is_usual {
+            known = self.look_further(problem, known);
+        }
         let Known { path, mut guidance, least, foreseen, .. } = known;
         let before = *left;
         let goal = standard.goal(&self.hars).clone();
-        let mut refined = self.hars.refine(problem, &goal, path.clone(), Effort::Usual, None, left);
+        let mut refined = self.hars.cut(problem, path.clone()).0;
         let cost = self.path_cost(problem, &refined);
         let limit = foreseen.map_or(DEAR_BY_UNUSUAL * least, |f| FAR_FROM_FORESEEN * f);
         let is_dear = cost > limit
             && cost > standard.enough(&mut self.hars)
             && (foreseen.is_some() || standard.is_unusual());
-        let doubtful =
-            refined.direction_changes() > most_changes(problem.kind) && cost > DOUBTFUL * least;
+        let doubtful = foreseen.is_none()
+            && refined.direction_changes() > most_changes(problem.kind)
+            && cost > DOUBTFUL * least;
         if is_dear {
             refined = self.or_searched(problem, &goal, refined, UNUSUAL_SEARCH, false, left);
         } else if doubtful {

@@ -300,6 +300,13 @@ impl HybridAStar {
         lower_bound(problem.start, goal, &problem.vehicle, &model, &mut self.words)
     }
 
+    /// `path` with its corners cut where that makes it cheaper, and its cost with nearness.
+    pub(crate) fn cut(&mut self, problem: &Problem, path: Path) -> (Path, f64) {
+        let model = self.cost(&problem.vehicle);
+        let estimates = self.queue.curve_estimates(&problem.vehicle, &model);
+        self.shortcuts.cut(problem, &model, estimates, path)
+    }
+
     /// `path`, found with `spent` expansions or known without a search, or a better one: its corners are cut, and where it still
     /// costs much more than it must, a search looks for something cheaper, as long as the `effort`
     /// says.
@@ -317,9 +324,7 @@ impl HybridAStar {
             Effort::Usual => path,
             Effort::Most => self.refine(problem, goal, path, Effort::Usual, spent, left),
         };
-        let model = self.cost(&problem.vehicle);
-        let estimates = self.queue.curve_estimates(&problem.vehicle, &model);
-        let (path, cost) = self.shortcuts.cut(problem, &model, estimates, path);
+        let (path, cost) = self.cut(problem, path);
         if cost <= effort.enough() * self.lower_bound(problem, goal) {
             return path;
         }
@@ -337,8 +342,7 @@ impl HybridAStar {
         self.improve(attempt, problem, goal, &mut best, effort.enough(), &mut spend);
         *left -= share - spend;
         let Some(found) = best.filter(|leg| leg.path != path) else { return path };
-        let estimates = self.queue.curve_estimates(&problem.vehicle, &model);
-        let (found, found_cost) = self.shortcuts.cut(problem, &model, estimates, found.path);
+        let (found, found_cost) = self.cut(problem, found.path);
         if found_cost < cost { found } else { path }
     }
 

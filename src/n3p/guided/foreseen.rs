@@ -9,12 +9,19 @@ use crate::selectors::foresight::{Codes, Outlook};
 const PROMISING: usize = 16;
 /// What costs so many times what is foreseen is taken at once: the network errs by as much (its card).
 const AT_ONCE: f64 = 1.02;
-/// A plan will do that costs at most so many times what is foreseen; one that costs so many times as much
-/// is searched for once more. Both chosen in the world "wide", seed 92.
+/// A plan will do that costs at most so many times what is foreseen; for one that costs so many times as much
+/// other ways than along known manoeuvres are tried, or it is searched for once more. All chosen in the
+/// world "wide" and at home, seed 92.
 const WILL_DO: f64 = 1.2;
-pub(super) const FAR_FROM_FORESEEN: f64 = 1.4;
+const OFF_FORESEEN: f64 = 1.3;
+pub(super) const FAR_FROM_FORESEEN: f64 = 1.6;
 
 impl Known {
+    /// Whether it costs clearly more than the best plan was foreseen to cost, or nothing is foreseen.
+    pub(super) fn is_off_foreseen(&self) -> bool {
+        self.foreseen.is_none_or(|foreseen| self.cost > OFF_FORESEEN * foreseen)
+    }
+
     /// Whether it costs about what the best plan was foreseen to cost, or less; `None` without foresight.
     pub(super) fn is_as_foreseen(&self) -> Option<bool> {
         self.foreseen.map(|foreseen| self.cost <= WILL_DO * foreseen)

@@ -7,7 +7,7 @@ use super::GuidedPlanner;
 use crate::curves::{Path, Segment};
 use crate::planners::cost::CostModel;
 use crate::planners::hybrid_astar::{GoalSet, HybridAStar, Leg};
-use crate::planners::library::{Library, LibraryPlan};
+use crate::planners::library::{Library, LibraryPlan, Reach};
 use crate::planners::{Effort, Guidance, Problem, Route};
 use crate::selectors::PoseSelector;
 use crate::selectors::foresight::{self, Codes, Foresight};
@@ -50,6 +50,13 @@ pub(super) const DEEPER: f64 = 0.3;
 const LEAST_GAP: f64 = 5.8;
 /// Those that it tries to join by a long way round, where no other plan was found.
 const LONG_WAYS: usize = 8;
+/// Where a plan is dearer than usual so many more manoeuvres are tried, and then so many by way of a pose
+/// that one motion leads to; what that is to cost, in terms of the plan.
+const FURTHER: usize = 40;
+const ONE_MOTION: Reach = Reach { motions: 1, manoeuvres: 40, tries: 60 };
+const CHEAPER: f64 = 0.97;
+/// Where there is no plan.
+const TWO_MOTIONS: Reach = Reach { motions: 2, manoeuvres: 100, tries: 300 };
 
 /// A library made ready for a way to stand parked and a footprint.
 pub(crate) struct Prepared {
@@ -271,6 +278,53 @@ impl GuidedPlanner {
         let known = best.as_ref().map(|known| known.cost);
         let Some(plan) = look_up.cheapest(known, bound, TRIES) else { return best };
         Some(rarely_used(plan, least))
+    }
+
+    /// What is known, or what more manoeuvres, and where it is far from what is foreseen others by way of
+    /// another pose, give for less.
+    pub(super) fn look_further(&mut self, problem: &Problem, mut known: Known) -> Known {
+        let Self { libraries, library_search, verdicts, hars, .. } = self;
+        let Some(prepared) = libraries.first().filter(|p| p.serves(problem)) else { return known };
+        let model = hars.cost(&problem.vehicle);
+        for library in [&prepared.library, &prepared.rare] {
+            if known.is_as_foreseen() == Some(true) {
+                break;
+            }
+            verdicts.clear();
+            let any = f64::INFINITY;
+            let mut look_up = library_search.look_up(library, verdicts, problem, &model, any);
+            let better = |plan: LibraryPlan, known: Known| Known {
+                foreseen: known.foreseen,
+                ..rarely_used(plan, known.least)
+            };
+            if let Some(plan) = look_up.cheapest_of(known.cost, FURTHER) {
+                known = better(plan, known);
+            }
+            if known.is_off_foreseen()
+                && let Some(plan) = look_up.by_way(CHEAPER * known.cost, ONE_MOTION)
+            {
+                known = better(plan, known);
+            }
+        }
+        known
+    }
+
+    /// The cheapest plan by way of another pose, for where no curve from the start joins a manoeuvre.
+    pub(super) fn by_way(&mut self, problem: &Problem) -> Option<Known> {
+        let Self { libraries, library_search, verdicts, hars, .. } = self;
+        let prepared = &libraries[0];
+        let model = hars.cost(&problem.vehicle);
+        let mut best: Option<Known> = None;
+        for library in [&prepared.library, &prepared.rare] {
+            verdicts.clear();
+            let any = f64::INFINITY;
+            let mut look_up = library_search.look_up(library, verdicts, problem, &model, any);
+            let least = least(problem, &model, look_up.least_estimates(prepared.straights));
+            let (bound, least) = best.as_ref().map_or((any, least), |best| (best.cost, best.least));
+            let plan = look_up.by_way(bound, TWO_MOTIONS);
+            best = plan.map(|plan| rarely_used(plan, least)).or(best);
+        }
+        best
     }
 
     /// The best so far, or a plan by a manoeuvre that ends where a usual bay's goal would be, farther
