@@ -97,6 +97,7 @@ impl Server {
     }
 
     /// Serves for ever.
+    #[allow(clippy::missing_panics_doc, reason = "its semaphore is never closed")]
     pub async fn serve(self) -> Infallible {
         let room = Arc::new(Semaphore::new(CONNECTIONS));
         let house = Arc::new(House {

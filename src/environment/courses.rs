@@ -58,6 +58,7 @@ impl Course {
     }
 
     /// The problem `index` of a seed: the same arguments give the same problem.
+    #[allow(clippy::missing_panics_doc, reason = "generated scenes have free ends")]
     pub fn problem(self, vehicle: &Vehicle, stratum: Stratum, seed: u64, index: u64) -> Problem {
         match self {
             Self::Simple => cell_problem(vehicle, stratum, &mut rng(seed, Stream::Course, index)),

@@ -138,6 +138,7 @@ impl PathFile {
     }
 
     /// The text of the file, every number exactly as it is.
+    #[allow(clippy::missing_panics_doc, reason = "what is written is plain data")]
     pub fn to_json(&self) -> String {
         serde_json::to_string(self).expect("plain numbers and strings")
     }

@@ -89,6 +89,7 @@ pub struct FleetSelector {
 pub const UNIT_LAYERS: [usize; 6] = network::layers(UNIT_COUNT);
 
 /// The bytes of a file; manoeuvres and network weights of the header's types in their order.
+#[allow(clippy::missing_panics_doc, reason = "what is written is plain data")]
 pub fn encode(
     header: &FleetHeader,
     manoeuvres: &[UnitManoeuvres],

@@ -90,6 +90,7 @@ pub struct Outlook {
 }
 
 /// The bytes of a file.
+#[allow(clippy::missing_panics_doc, reason = "what is written is plain data")]
 pub fn encode(
     header: &ForesightHeader,
     scene: &[LayerWeights],

@@ -146,6 +146,7 @@ pub struct KnnEntries {
 }
 
 /// The bytes of a file. `entries`: of each of [`KnnHeader::kinds`].
+#[allow(clippy::missing_panics_doc, reason = "what is written is plain data")]
 pub fn encode(mut header: KnnHeader, entries: &[KnnEntries]) -> Vec<u8> {
     let mut payload = Vec::new();
     let extent = header.extent;

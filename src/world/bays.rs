@@ -80,6 +80,10 @@ const ROOM: f64 = 0.15;
 
 /// The scene number `index` of a seed, for the default vehicle, named `UNUSUAL-TYPE-INDEX`. Its
 /// parking type is that of `kind`, but for oblique bays, which have none.
+///
+/// # Panics
+///
+/// For angled bays: none of these is.
 pub fn bay(unusual: Unusual, kind: ParkingType, seed: u64, index: u64) -> Scene {
     let place = |among: usize, of: u64| among as u64 + of;
     let number = Unusual::ALL.iter().position(|&u| u == unusual).expect("one of all");

@@ -338,6 +338,7 @@ impl Grid {
 
     /// The free lane and the spot of a cell, in the spot frame. The corners of the spot: its closed
     /// end, then its mouth.
+    #[allow(clippy::missing_panics_doc, reason = "a spot has four corners")]
     pub fn regions(&self, cell: &Cell) -> [Polygon; 2] {
         let polygon = |corners: [Vec2; 4]| Polygon::new(corners.to_vec()).expect("four points");
         let lane = Polygon::rectangle(Pose::default(), self.lane(cell));

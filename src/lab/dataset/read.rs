@@ -158,6 +158,7 @@ impl Dataset {
     }
 
     /// Checks that the data was collected with exactly this vehicle.
+    #[allow(clippy::missing_panics_doc, reason = "what is written is plain data")]
     pub fn check_vehicle(&self, vehicle: &Vehicle) -> Result<(), DatasetError> {
         let value = |v| serde_json::to_value(v).expect("a vehicle is plain data");
         match first_difference("", &value(&self.metadata.vehicle), &value(vehicle)) {

@@ -22,6 +22,7 @@ pub const METADATA_KEY: &str = "n3p";
 /// The Parquet file of `samples`, which must be [rounded](Sample::rounded).
 ///
 /// The same rows give the same bytes: no time stamps, one row group.
+#[allow(clippy::missing_panics_doc, reason = "what is written is plain data")]
 pub fn encode(metadata: &Metadata, samples: &[Sample]) -> Result<Vec<u8>, ParquetError> {
     let schema = Arc::new(columns());
     let mut properties = WriterProperties::builder()

@@ -273,7 +273,12 @@ fn speed_up(
 }
 
 /// The 95 % percentile interval of `statistic` over resampled indices `0..n`.
-fn bootstrap(n: usize, seed: u64, stream: u64, statistic: impl Fn(&[usize]) -> f64) -> Interval {
+pub(super) fn bootstrap(
+    n: usize,
+    seed: u64,
+    stream: u64,
+    statistic: impl Fn(&[usize]) -> f64,
+) -> Interval {
     let mut rng = rng(seed, Stream::Bootstrap, stream);
     let mut picks = vec![0; n];
     let mut values: Vec<f64> = (0..RESAMPLES)

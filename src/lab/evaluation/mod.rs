@@ -2,7 +2,7 @@
 //!
 //! Reading order: [`crate::episode`] runs one method on one scene and has its path checked by the
 //! independent [`oracle`]; [`suite`] does so for all; [`rows`] are saved; [`metrics`] summarises them,
-//! [`quality`] compares their paths, [`away`] scenes at home and elsewhere, [`clearance`] says how much room they leave, [`drives`] what became of those that were driven, [`table`] lays them out beside the paper's, [`report`] writes them down, and [`html`] with
+//! [`quality`] compares their paths, [`paired`] methods scene by scene, [`away`] scenes at home and elsewhere, [`clearance`] says how much room they leave, [`drives`] what became of those that were driven, [`table`] lays them out beside the paper's, [`report`] writes them down, and [`html`] with
 //! plots and a gallery of the paths that [`trace`] kept. [`learning_curve`] is what experiments add: how much data is enough.
 
 pub mod away;
@@ -13,6 +13,7 @@ pub mod learning_curve;
 pub mod metrics;
 pub mod oracle;
 mod outputs;
+pub mod paired;
 pub mod quality;
 pub mod report;
 pub mod rows;

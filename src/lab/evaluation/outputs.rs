@@ -139,6 +139,7 @@ impl RunRecord {
 
     /// Keeps `out` for this process and records that this run begins there, or checks that it is the one that
     /// began there: `None` where another one did, or rows are of none.
+    #[allow(clippy::missing_panics_doc, reason = "what is written is plain data")]
     pub fn claim(&self, out: &Path, goes_on: bool) -> Result<Option<Keeper>, OutputError> {
         make_folders(Some(out), None)?;
         let folder = |error| OutputError::Folder { path: out.to_owned(), error };

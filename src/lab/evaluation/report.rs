@@ -10,6 +10,7 @@ use super::clearance;
 use super::drives;
 use super::learning_curve::{self, CurvePoint};
 use super::metrics;
+use super::paired;
 use super::quality;
 use super::table;
 use crate::episode::Row;
@@ -93,6 +94,10 @@ pub fn text(rows: &[Row], seed: u64) -> String {
     }
     let _ = writeln!(out, "{}", table::speed_ups(&groups).text());
     let _ = writeln!(out, "{}", quality::table(&quality::summarise(rows)).text());
+    let paired = paired::compare(rows, seed);
+    if !paired.is_empty() {
+        let _ = writeln!(out, "{}", paired::table(&paired).text());
+    }
     let clearance = clearance::table(rows);
     if !clearance.rows.is_empty() {
         let _ = writeln!(out, "{}", clearance.text());
@@ -148,6 +153,10 @@ pub fn markdown(results: &Results) -> String {
     let _ = write!(out, "\n{NOTES}");
     let quality = quality::table(&quality::summarise(rows));
     let _ = write!(out, "\n{}\n{}\n", quality.markdown(), quality::NOTE);
+    let paired = paired::compare(rows, provenance.seed);
+    if !paired.is_empty() {
+        let _ = write!(out, "\n{}\n{}\n", paired::table(&paired).markdown(), paired::NOTE);
+    }
     let clearance = clearance::table(rows);
     if !clearance.rows.is_empty() {
         let _ = write!(out, "\n{}\n{}\n", clearance.markdown(), clearance::NOTE);

@@ -196,6 +196,7 @@ pub fn set_of(dir: &Path) -> String {
 /// The scenes of a folder, of one parking type if `kind` is given. Files that hold no scene, or one
 /// whose start or goal is not free on these `terms`, are left out and named. Where that leaves
 /// nothing, or there is nothing, it is an error. Their set has the folder's name.
+#[allow(clippy::missing_panics_doc, reason = "a folder without scenes has a complaint")]
 pub fn from_folder(
     dir: &Path,
     kind: Option<ParkingType>,
@@ -279,6 +280,10 @@ impl SuiteConfig {
 /// of that order are left out: those an interrupted run has done already.
 ///
 /// Returns the rows of this run, or the first error of `sink`.
+///
+/// # Panics
+///
+/// Where a case is no problem on the terms of `config`: [`from_folder`] leaves such out.
 pub fn run<E>(
     cases: &[Case],
     models: &Models,

@@ -375,6 +375,7 @@ impl ExperimentConfig {
     }
 
     /// The file with every setting spelt out.
+    #[allow(clippy::missing_panics_doc, reason = "what is written is plain data")]
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("settings are plain values")
     }

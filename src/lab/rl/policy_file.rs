@@ -48,6 +48,7 @@ pub struct PolicyHeader {
 }
 
 /// The bytes of a file: the same input gives the same bytes.
+#[allow(clippy::missing_panics_doc, reason = "what is written is plain data")]
 pub fn encode(header: &PolicyHeader, actor: &BTreeMap<String, Vec<f32>>) -> Vec<u8> {
     let shapes = Role::Actor.shapes();
     let tensors = shapes.into_iter().map(|(name, shape)| {

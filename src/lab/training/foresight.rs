@@ -71,6 +71,7 @@ pub fn load(paths: &[impl AsRef<Path>]) -> Result<Vec<(Model, String)>, Artefact
 
 /// Trains with the libraries of `models` and writes the network to `out`, with its log, its model card and
 /// the loss curve (`.training.svg`) beside it.
+#[allow(clippy::missing_panics_doc, reason = "what is written is plain data")]
 pub fn train(
     models: Vec<(Model, String)>,
     config: &ForesightConfig,

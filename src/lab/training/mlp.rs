@@ -63,6 +63,7 @@ pub fn check_kind(kind: ParkingType) -> Result<(), TrainingError> {
 
 /// Trains a network of `kind` and writes it to `out`, with its log, its model card and the
 /// loss curve (`.training.svg`) beside it.
+#[allow(clippy::missing_panics_doc, reason = "what is written is plain data")]
 pub fn train(
     metadata: &Metadata,
     samples: &[Sample],

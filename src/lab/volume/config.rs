@@ -123,6 +123,7 @@ impl VolumeConfig {
     }
 
     /// As a file.
+    #[allow(clippy::missing_panics_doc, reason = "what is written is plain data")]
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("plain data")
     }

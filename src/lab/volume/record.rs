@@ -279,6 +279,7 @@ impl ShardRecord {
     }
 
     /// Writes the record; it appears whole or not at all.
+    #[allow(clippy::missing_panics_doc, reason = "what is written is plain data")]
     pub fn write(&self, folder: &Path) -> io::Result<()> {
         let sealed = Sealed { sha256: self.sum(), record: self.clone() };
         let json = serde_json::to_string_pretty(&sealed).expect("plain data") + "\n";

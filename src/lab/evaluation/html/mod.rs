@@ -75,6 +75,7 @@ struct Page<'a> {
 }
 
 /// The page of a run. `shown` are the [`gallery::chosen`] cases, `traces` theirs.
+#[allow(clippy::missing_panics_doc, reason = "the template is part of this crate")]
 pub fn page(results: &Results, shown: &[&Case], traces: &[Trace]) -> String {
     let &Results { title, rows, drives, curve, provenance } = results;
     let groups = metrics::summarise(rows, provenance.seed);

@@ -38,6 +38,7 @@ pub enum Begin {
 
 /// Trains a policy and writes it to `out`, with its log, its model card and the curve
 /// (`.training.svg`) beside it.
+#[allow(clippy::missing_panics_doc, reason = "a report adds a point")]
 pub fn train(
     course: Course,
     config: &RlConfig,
