@@ -212,7 +212,7 @@ impl GuidedPlanner {
         left: &mut usize,
     ) -> Result<(Path, Guidance), NoPath> {
         let has_library = config.library && self.prepare_library(problem);
-        if has_library && let Some(known) = self.look_up(problem).or_else(|| self.by_way(problem)) {
+        if has_library && let Some(known) = self.look_up(problem) {
             return Ok(self.settle(problem, known, effort, left));
         }
         let mut goal = self.hars.goal_set(problem);

@@ -1,7 +1,7 @@
 //! What `n3p` foresees: which known manoeuvres to try first, and what a plan may cost.
 
 use super::GuidedPlanner;
-use super::known::{DEEPER, Known, USUAL, least, rarely_used};
+use super::known::{DEEPER, Known, USUAL, least};
 use crate::planners::Problem;
 use crate::selectors::foresight::{Codes, Outlook};
 
@@ -57,22 +57,22 @@ impl Ranking {
 }
 
 impl GuidedPlanner {
-    /// The cheapest of the most promising manoeuvres, first of those in common use, then, where none of these
-    /// costs about as little as foreseen, of the others; `None` where none can be driven or nothing
-    /// is foreseen.
-    pub(super) fn look_ahead(&mut self, problem: &Problem) -> Option<Known> {
+    /// The cheapest of the most promising manoeuvres, if one of them can be driven, and what the best plan is
+    /// foreseen to cost, if anything is foreseen.
+    pub(super) fn look_ahead(&mut self, problem: &Problem) -> (Option<Known>, Option<f64>) {
         let Self { libraries, library_search, verdicts, hars, foresight, ranking, .. } = self;
         let prepared = &libraries[0];
-        let (foresight, (codes, of_rare)) = foresight.as_ref().zip(prepared.codes.as_ref())?;
         // It has not seen deeper bays.
-        if problem.mouth > DEEPER * problem.vehicle.scale() {
-            return None;
-        }
+        let is_deeper = problem.mouth > DEEPER * problem.vehicle.scale();
+        let Some((foresight, codes)) =
+            foresight.as_ref().zip(prepared.codes.as_ref()).filter(|_| !is_deeper)
+        else {
+            return (None, None);
+        };
         let cost = hars.cost(&problem.vehicle);
-        let library = &prepared.library;
         verdicts.clear();
         let any = f64::INFINITY;
-        let mut look_up = library_search.look_up(library, verdicts, problem, &cost, any);
+        let mut look_up = library_search.look_up(&prepared.library, verdicts, problem, &cost, any);
         let estimates = look_up.least_estimates(prepared.straights);
         let least = least(problem, &cost, estimates);
         ranking.outlook = foresight.look(problem, prepared.stance, [estimates.0, estimates.1]);
@@ -87,18 +87,6 @@ impl GuidedPlanner {
         {
             best = Some(prepared.known(better, least));
         }
-        let bound = best.as_ref().map_or(any, |known| known.cost);
-        if bound > WILL_DO * foreseen {
-            verdicts.clear();
-            let rare = &prepared.rare;
-            let codes =
-                of_rare.get_or_init(|| foresight.codes(&prepared.values(rare, &problem.vehicle)));
-            let mut look_up = library_search.look_up(rare, verdicts, problem, &cost, bound);
-            let order = ranking.order(codes, look_up.estimates());
-            if let Some(plan) = look_up.promising(order, bound, AT_ONCE * foreseen) {
-                best = Some(rarely_used(plan, least));
-            }
-        }
-        best.map(|known| Known { foreseen: Some(foreseen), ..known })
+        (best, Some(foreseen))
     }
 }

@@ -1,7 +1,6 @@
 //! What `n3p` knows without a search: the manoeuvres of its library, and what they say about a plan.
 
 use std::cell::OnceCell;
-use std::sync::OnceLock;
 
 use super::GuidedPlanner;
 use crate::curves::{Path, Segment};
@@ -67,9 +66,8 @@ pub(crate) struct Prepared {
     pub(crate) straights: usize,
     /// Manoeuvres that are rarely of use.
     pub(crate) rare: Library,
-    /// What foresight knows of the library's manoeuvres, where there is foresight, and, once they are
-    /// asked for, of those rarely of use.
-    pub(super) codes: Option<(Codes, OnceLock<Codes>)>,
+    /// What foresight knows of the library's manoeuvres, where there is foresight.
+    pub(super) codes: Option<Codes>,
 }
 
 impl Prepared {
@@ -92,10 +90,9 @@ impl Prepared {
             library.add(entry, &cost);
         }
         let mut prepared = Self { stance, library, straights, rare, codes: None };
-        prepared.codes = foresight.map(|foresight| {
-            let codes = foresight.codes(&prepared.values(&prepared.library, vehicle));
-            (codes, OnceLock::new())
-        });
+        let values =
+            |foresight: &Foresight| foresight.codes(&prepared.values(&prepared.library, vehicle));
+        prepared.codes = foresight.map(values);
         Some(prepared)
     }
 
@@ -221,9 +218,13 @@ pub(super) fn most_changes(kind: Option<ParkingType>) -> usize {
 }
 
 impl GuidedPlanner {
-    /// The cheapest of what is known without a search, as foreseen, or else as estimates say.
+    /// The cheapest of what is known without a search, as foreseen, or else as estimates say, or else by way
+    /// of another pose.
     pub(super) fn look_up(&mut self, problem: &Problem) -> Option<Known> {
-        self.look_ahead(problem).or_else(|| self.by_estimates(problem))
+        let (known, foreseen) = self.look_ahead(problem);
+        let known = known.or_else(|| self.by_estimates(problem));
+        let known = known.or_else(|| self.by_way(problem))?;
+        Some(Known { foreseen, ..known })
     }
 
     /// The cheapest of what is known without a search: manoeuvres of the library prepared last, and
@@ -310,7 +311,7 @@ impl GuidedPlanner {
     }
 
     /// The cheapest plan by way of another pose, for where no curve from the start joins a manoeuvre.
-    pub(super) fn by_way(&mut self, problem: &Problem) -> Option<Known> {
+    fn by_way(&mut self, problem: &Problem) -> Option<Known> {
         let Self { libraries, library_search, verdicts, hars, .. } = self;
         let prepared = &libraries[0];
         let model = hars.cost(&problem.vehicle);

@@ -91,17 +91,22 @@ impl Boxes {
 impl Passages {
     pub(super) fn new(manoeuvres: &[Manoeuvre], vehicle: &Vehicle) -> Self {
         let boxes = Boxes::new(vehicle);
-        let mut passages = Vec::new();
+        let mut driven_through = Vec::new();
         for (manoeuvre, passing) in (0..).zip(manoeuvres) {
-            passages.extend(passing.poses(vehicle.scale()).map(|(motion, driven, at)| {
+            driven_through.extend(passing.poses(vehicle.scale()).map(|(motion, driven, at)| {
                 let (number, driven) = (boxes.number(boxes.of(at)), driven as f32);
                 let [x, y, heading] = [at.x, at.y, at.heading].map(|v| v as f32);
                 let place = Place { motion: motion as u32, driven, x, y, heading };
                 Passage { number, manoeuvre, place }
             }));
         }
-        // Stable: in the order of driving within each box.
-        passages.sort_by_key(|p| (p.number, p.manoeuvre));
+        // By box, and in the order of manoeuvres and driving within each. One integer is sorted sooner
+        // than all of a passage.
+        let numbers = (0..).zip(&driven_through);
+        let mut order: Vec<u64> =
+            numbers.map(|(i, p): (u64, &Passage)| u64::from(p.number) << 32 | i).collect();
+        order.sort_unstable();
+        let passages = order.iter().map(|key| driven_through[*key as u32 as usize]).collect();
         Self { passages, boxes }
     }
 

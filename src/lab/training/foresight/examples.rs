@@ -118,10 +118,10 @@ fn collect_of(
             let example = pupil.example(library, source, seed, index as u64, config.on_the_way);
             found.extend(example.map(|example| (index, example)));
         }
-        let values = pupil.prepared.as_ref().map(|prepared| {
-            let of = |library| prepared.values(library, &source.vehicle);
-            [of(&prepared.library), of(&prepared.rare)].concat()
-        });
+        let values = pupil
+            .prepared
+            .as_ref()
+            .map(|prepared| prepared.values(&prepared.library, &source.vehicle));
         let values = values.unwrap_or_default();
         (found, values)
     };
@@ -191,23 +191,19 @@ impl Pupil {
         if let Some(leg) = teacher.direct_below(problem, problem.start, &goal, best) {
             best = leg.cost;
         }
-        let (mut estimates, mut costs) = (Vec::new(), Vec::new());
-        let mut least = [any; 2];
-        for library in [&prepared.library, &prepared.rare] {
-            verdicts.clear();
-            let mut look_up = search.look_up(library, verdicts, problem, model, any);
-            let first = estimates.len();
-            if first == 0 {
-                // What `n3p` knows when it looks.
-                least = look_up.least_estimates(prepared.straights).into();
-            }
-            estimates.extend_from_slice(look_up.estimates());
-            let of_library = look_up.costs_within(TIMES).into_iter();
-            costs.extend(of_library.map(|(i, cost)| (first + i, cost)));
-        }
-        let known = costs.iter().map(|(_, cost)| *cost).fold(f64::INFINITY, f64::min);
-        costs.retain(|(_, cost)| *cost < TIMES * known);
+        verdicts.clear();
+        let mut look_up = search.look_up(&prepared.library, verdicts, problem, model, any);
+        // What `n3p` knows when it looks.
+        let least: [f64; 2] = look_up.least_estimates(prepared.straights).into();
+        let estimates = look_up.estimates().to_vec();
+        let costs = look_up.costs_within(TIMES);
+        let known = costs.iter().map(|(_, cost)| *cost).fold(any, f64::min);
         best = best.min(known);
+        verdicts.clear();
+        let mut look_up = search.look_up(&prepared.rare, verdicts, problem, model, best);
+        if let Some(plan) = look_up.cheapest_of(best, usize::MAX) {
+            best = plan.cost;
+        }
         let unit = vehicle.turning_radius();
         let least_of_all = least[0].min(least[1]) as f32;
         Some(Example {
