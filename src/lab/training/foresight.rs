@@ -1,7 +1,7 @@
 //! Foresight learnt in many worlds: what known manoeuvres are worth in a scene, and what the best plan
 //! costs ([`crate::selectors::foresight`]).
 //!
-//! World by world every manoeuvre of the library is tried, and a teacher, Hybrid A* that takes the best of
+//! World by world every manoeuvre in common use is tried, and a teacher, Hybrid A* that takes the best of
 //! several solutions and improves it, looks for something better (`examples`). The network learns which
 //! manoeuvres come near the best one, and what the best plan costs (`fit`). Whole libraries are
 //! validated with worlds of another seed.

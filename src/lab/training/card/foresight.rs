@@ -52,7 +52,7 @@ a manoeuvre, {manoeuvre}: where it begins, what it costs, what it sweeps.
 | model | SHA-256 |
 |---|---|
 {models}
-Generated worlds, their sizes drawn far wider than those of any level; every manoeuvre was tried in each, and
+Generated worlds, their sizes drawn far wider than those of any level; those in common use were tried in each, and
 Hybrid A* looked for something better. In some the car begins somewhere along a plan. Epoch kept:
 {best} of {epochs} ([losses](<{curve}>)).
 
