@@ -31,7 +31,7 @@ pub(in crate::lab::training) fn foresight(out: &Path, log: &ForesightLog) -> Str
     let curve = out.with_extension("training.svg");
     format!(
         "\
-# Model card: `{file}`
+# Model card: {file}
 
 A network that sees the free space around a spot, and foresees what known manoeuvres are worth there and
 what the best plan will cost. Written by n3p {VERSION}.
