@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use crate::curves::{Path, Segment};
 use crate::geometry::{Pose, Vec2};
 use crate::planners::hybrid_astar::{Entry, GoalSet, Leg};
-use crate::planners::library::{LibrarySearch, Tried, Verdicts};
+use crate::planners::library::{LibrarySearch, Tried};
 use crate::planners::{
     Budget, Effort, Guidance, HybridAStar, HybridAStarConfig, NoPath, PlanResult, Planner, Problem,
     Route,
@@ -33,7 +33,7 @@ mod foreseen;
 pub(crate) mod known;
 
 use foreseen::{FAR_FROM_FORESEEN, Ranking};
-use known::{DEAR_BY_UNUSUAL, Known, Prepared, Standard, most_changes};
+use known::{Checked, DEAR_BY_UNUSUAL, Known, Prepared, Standard, most_changes};
 
 /// Expansions that the paper's two legs may spend, so that a pose just beside the feasible
 /// ones does not use up what the full search needs.
@@ -97,7 +97,7 @@ pub struct GuidedPlanner {
     /// latest first.
     libraries: Vec<Prepared>,
     library_search: LibrarySearch,
-    verdicts: Verdicts,
+    checked: Checked,
     foresight: Option<Arc<Foresight>>,
     ranking: Ranking,
 }
@@ -132,7 +132,7 @@ impl GuidedPlanner {
             poses: Vec::new(),
             libraries: Vec::new(),
             library_search: LibrarySearch::default(),
-            verdicts: Verdicts::default(),
+            checked: Checked::default(),
             foresight: None,
             ranking: Ranking::default(),
         }

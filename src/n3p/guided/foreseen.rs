@@ -60,7 +60,7 @@ impl GuidedPlanner {
     /// The cheapest of the most promising manoeuvres, if one of them can be driven, and what the best plan is
     /// foreseen to cost, if anything is foreseen.
     pub(super) fn look_ahead(&mut self, problem: &Problem) -> (Option<Known>, Option<f64>) {
-        let Self { libraries, library_search, verdicts, hars, foresight, ranking, .. } = self;
+        let Self { libraries, library_search, checked, hars, foresight, ranking, .. } = self;
         let prepared = &libraries[0];
         // It has not seen deeper bays.
         let is_deeper = problem.mouth > DEEPER * problem.vehicle.scale();
@@ -70,9 +70,8 @@ impl GuidedPlanner {
             return (None, None);
         };
         let cost = hars.cost(&problem.vehicle);
-        verdicts.clear();
-        let any = f64::INFINITY;
-        let mut look_up = library_search.look_up(&prepared.library, verdicts, problem, &cost, any);
+        let (library, verdicts, any) = (&prepared.library, &mut checked.common, f64::INFINITY);
+        let mut look_up = library_search.look_up(library, verdicts, problem, &cost, any);
         let estimates = look_up.least_estimates(prepared.straights);
         let least = least(problem, &cost, estimates);
         ranking.outlook = foresight.look(problem, prepared.stance, [estimates.0, estimates.1]);

@@ -6,7 +6,7 @@ use super::GuidedPlanner;
 use crate::curves::{Path, Segment};
 use crate::planners::cost::CostModel;
 use crate::planners::hybrid_astar::{GoalSet, HybridAStar, Leg};
-use crate::planners::library::{Library, LibraryPlan, Reach};
+use crate::planners::library::{Library, LibraryPlan, Reach, Verdicts};
 use crate::planners::{Effort, Guidance, Problem, Route};
 use crate::selectors::PoseSelector;
 use crate::selectors::foresight::{self, Codes, Foresight};
@@ -167,6 +167,21 @@ impl<'a> Standard<'a> {
     }
 }
 
+/// Which manoeuvres of a library are free in the problem at hand, as far as it was asked.
+#[derive(Default)]
+pub(super) struct Checked {
+    pub(super) common: Verdicts,
+    pub(super) rare: Verdicts,
+}
+
+impl Checked {
+    /// For another problem.
+    fn clear(&mut self) {
+        self.common.clear();
+        self.rare.clear();
+    }
+}
+
 /// A plan that took no search.
 pub(super) struct Known {
     pub(super) path: Path,
@@ -230,12 +245,10 @@ impl GuidedPlanner {
     /// The cheapest of what is known without a search: manoeuvres of the library prepared last, and
     /// the curve straight to the goal where none of the first can be joined.
     fn by_estimates(&mut self, problem: &Problem) -> Option<Known> {
-        let Self { libraries, library_search, verdicts, hars, .. } = self;
+        let Self { libraries, library_search, checked, hars, .. } = self;
         let cost = hars.cost(&problem.vehicle);
         let prepared = &libraries[0];
-        verdicts.clear();
-        let any = f64::INFINITY;
-        let library = &prepared.library;
+        let (library, verdicts, any) = (&prepared.library, &mut checked.common, f64::INFINITY);
         let mut look_up = library_search.look_up(library, verdicts, problem, &cost, any);
         let least = least(problem, &cost, look_up.least_estimates(prepared.straights));
         let by_manoeuvre = |plan| prepared.known(plan, least);
@@ -271,9 +284,8 @@ impl GuidedPlanner {
         best: Option<Known>,
         least: f64,
     ) -> Option<Known> {
-        let Self { libraries, library_search, verdicts, .. } = self;
-        let rare = &libraries[0].rare;
-        verdicts.clear();
+        let Self { libraries, library_search, checked, .. } = self;
+        let (rare, verdicts) = (&libraries[0].rare, &mut checked.rare);
         let bound = best.as_ref().map_or(f64::INFINITY, |known| known.cost);
         let mut look_up = library_search.look_up(rare, verdicts, problem, model, bound);
         let known = best.as_ref().map(|known| known.cost);
@@ -284,14 +296,14 @@ impl GuidedPlanner {
     /// What is known, or what more manoeuvres, and where it is far from what is foreseen others by way of
     /// another pose, give for less.
     pub(super) fn look_further(&mut self, problem: &Problem, mut known: Known) -> Known {
-        let Self { libraries, library_search, verdicts, hars, .. } = self;
+        let Self { libraries, library_search, checked, hars, .. } = self;
         let Some(prepared) = libraries.first().filter(|p| p.serves(problem)) else { return known };
         let model = hars.cost(&problem.vehicle);
-        for library in [&prepared.library, &prepared.rare] {
+        let Checked { common, rare } = checked;
+        for (library, verdicts) in [(&prepared.library, common), (&prepared.rare, rare)] {
             if known.is_as_foreseen() == Some(true) {
                 break;
             }
-            verdicts.clear();
             let any = f64::INFINITY;
             let mut look_up = library_search.look_up(library, verdicts, problem, &model, any);
             let better = |plan: LibraryPlan, known: Known| Known {
@@ -312,12 +324,12 @@ impl GuidedPlanner {
 
     /// The cheapest plan by way of another pose, for where no curve from the start joins a manoeuvre.
     fn by_way(&mut self, problem: &Problem) -> Option<Known> {
-        let Self { libraries, library_search, verdicts, hars, .. } = self;
+        let Self { libraries, library_search, checked, hars, .. } = self;
         let prepared = &libraries[0];
         let model = hars.cost(&problem.vehicle);
         let mut best: Option<Known> = None;
-        for library in [&prepared.library, &prepared.rare] {
-            verdicts.clear();
+        let Checked { common, rare } = checked;
+        for (library, verdicts) in [(&prepared.library, common), (&prepared.rare, rare)] {
             let any = f64::INFINITY;
             let mut look_up = library_search.look_up(library, verdicts, problem, &model, any);
             let least = least(problem, &model, look_up.least_estimates(prepared.straights));
@@ -345,10 +357,10 @@ impl GuidedPlanner {
         if !problem.collision.segments_are_free(end, &[straight]) {
             return best;
         }
-        let Self { libraries, library_search, verdicts, .. } = self;
-        let library = &libraries[0].library;
-        verdicts.clear();
-        let any = f64::INFINITY;
+        let Self { libraries, library_search, .. } = self;
+        let (library, any) = (&libraries[0].library, f64::INFINITY);
+        // Where they end farther out others are free.
+        let verdicts = &mut Verdicts::default();
         let in_cost = model.per_metre(*gear) * problem.mouth;
         let mut look_up = library_search.look_up_at(library, verdicts, problem, end, model, any);
         let (least, _) = look_up.least_estimates(library.len());
@@ -367,6 +379,7 @@ impl GuidedPlanner {
         if problem.kind.is_none() {
             return false;
         }
+        self.checked.clear();
         match self.libraries.iter().position(|p| p.serves(problem)) {
             Some(at) => self.libraries[..=at].rotate_right(1),
             None => {
