@@ -322,22 +322,19 @@ impl GuidedPlanner {
         known
     }
 
-    /// The cheapest plan by way of another pose, for where no curve from the start joins a manoeuvre.
+    /// A plan by way of another pose, for where no curve from the start joins a manoeuvre: by one of those in
+    /// common use, or else by another.
     fn by_way(&mut self, problem: &Problem) -> Option<Known> {
         let Self { libraries, library_search, checked, hars, .. } = self;
         let prepared = &libraries[0];
         let model = hars.cost(&problem.vehicle);
-        let mut best: Option<Known> = None;
-        let Checked { common, rare } = checked;
-        for (library, verdicts) in [(&prepared.library, common), (&prepared.rare, rare)] {
-            let any = f64::INFINITY;
+        let (Checked { common, rare }, any) = (checked, f64::INFINITY);
+        let parts = [(&prepared.library, common), (&prepared.rare, rare)];
+        parts.into_iter().find_map(|(library, verdicts)| {
             let mut look_up = library_search.look_up(library, verdicts, problem, &model, any);
             let least = least(problem, &model, look_up.least_estimates(prepared.straights));
-            let (bound, least) = best.as_ref().map_or((any, least), |best| (best.cost, best.least));
-            let plan = look_up.by_way(bound, TWO_MOTIONS);
-            best = plan.map(|plan| rarely_used(plan, least)).or(best);
-        }
-        best
+            look_up.by_way(any, TWO_MOTIONS).map(|plan| rarely_used(plan, least))
+        })
     }
 
     /// The best so far, or a plan by a manoeuvre that ends where a usual bay's goal would be, farther
