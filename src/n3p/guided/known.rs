@@ -329,10 +329,13 @@ impl GuidedPlanner {
         let prepared = &libraries[0];
         let model = hars.cost(&problem.vehicle);
         let (Checked { common, rare }, any) = (checked, f64::INFINITY);
-        let parts = [(&prepared.library, common), (&prepared.rare, rare)];
-        parts.into_iter().find_map(|(library, verdicts)| {
+        let parts = [
+            (&prepared.library, common, prepared.straights),
+            (&prepared.rare, rare, prepared.rare.len()),
+        ];
+        parts.into_iter().find_map(|(library, verdicts, manoeuvres)| {
             let mut look_up = library_search.look_up(library, verdicts, problem, &model, any);
-            let least = least(problem, &model, look_up.least_estimates(prepared.straights));
+            let least = least(problem, &model, look_up.least_estimates(manoeuvres));
             look_up.by_way(any, TWO_MOTIONS).map(|plan| rarely_used(plan, least))
         })
     }
