@@ -170,22 +170,32 @@ impl Library {
     pub fn rest(&self, problem: &Problem, model: &CostModel, bound: f64) -> Option<(Path, f64)> {
         let passages = self.passages.get_or_init(|| Passages::new(&self.manoeuvres, &self.vehicle));
         let start = problem.goal.relative(problem.start);
-        let near = passages.near(start, &self.vehicle).into_iter();
-        let near = near.map(|(i, _, place)| self.manoeuvres[i as usize].rest(place, start));
+        let mut near = passages.near(start, &self.vehicle);
         let cost = |path: &Path| model.path(&self.vehicle, &path.segments);
-        let near = near.map(|path| (cost(&path), path));
-        let mut near: Vec<(f64, Path)> = near.filter(|(cost, _)| *cost < bound).collect();
-        near.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let here =
-            |(_, rest): (f64, Path)| Path { start: problem.goal.compose(rest.start), ..rest };
-        let nearest = near.into_iter().take(NEAR_RESTS).map(here);
-        let free = nearest.filter(|rest| problem.collision.path_is_free(rest));
-        let mut bent = free.take(RESTS).filter_map(|rest| {
+        let rest = |(i, _, place): &(u32, f64, Place)| {
+            let path = self.manoeuvres[*i as usize].rest(*place, start);
+            (cost(&path), path)
+        };
+        let mut cheapest: Vec<(f64, Path)> =
+            near.iter().map(rest).filter(|(cost, _)| *cost < bound).collect();
+        cheapest.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let bent = |(_, rest): (f64, Path)| {
             let path = joint::close(problem, &rest)?;
             let cost = cost(&path);
             (cost < bound).then_some((path, cost))
-        });
-        // In order of cost, which bending hardly changes.
-        bent.next()
+        };
+        let first_bent = |rests: &mut dyn Iterator<Item = (f64, Path)>| {
+            let here = |(cost, rest): (f64, Path)| {
+                (cost, Path { start: problem.goal.compose(rest.start), ..rest })
+            };
+            let free = |(_, rest): &(f64, Path)| problem.collision.path_is_free(rest);
+            rests.map(here).filter(free).take(RESTS).find_map(bent)
+        };
+        // In order of cost, which bending hardly changes. Many may pass here: who stands upon one of them
+        // goes on, whatever the others cost.
+        first_bent(&mut cheapest.into_iter().take(NEAR_RESTS)).or_else(|| {
+            near.sort_by(|a, b| a.1.total_cmp(&b.1));
+            first_bent(&mut near.iter().take(RESTS).map(rest).filter(|(cost, _)| *cost < bound))
+        })
     }
 }
