@@ -6,9 +6,10 @@
 //! joins is the plan, without any search. Where the first few cannot be joined, the curve straight
 //! to the goal is one more way. Where there is none, several poses of the selector are tried, then
 //! one search goes to the goal or any of these poses. Who starts within a manoeuvre may drive its rest.
-//! What passes something near, or costs more than usual for its spot and its changes of gear, is refined.
-//! What then still costs more than twice the estimate, by an unusual spot or with more changes than
-//! usual, is searched for once more.
+//! What costs more than usual for its spot and its changes of gear is looked at further, and its corners
+//! are cut, as are those of what passes something near. What then is still far from what was foreseen is
+//! searched for once more; without foresight, what costs more than twice the estimate, by an unusual spot or
+//! with more changes than usual.
 //! Either way the path leaves certified by the exact swept check.
 
 use std::sync::Arc;

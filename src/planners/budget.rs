@@ -39,8 +39,8 @@ pub enum Effort {
     First,
     /// Corners of a searched path are cut, and where it still costs more than 1.1 times what any path
     /// must, 400 expansions look for something cheaper, or twice as many as it took where that is more.
-    /// A path known without a search is treated so only where it costs more than usual or passes
-    /// something near, with 120 expansions.
+    /// Of a path known without a search corners are cut where it costs more than usual or passes
+    /// something near; it is searched for only where it is far from what was foreseen.
     #[default]
     Usual,
     /// Every path that costs more than it must, obstacles aside, is looked at again, with half of
