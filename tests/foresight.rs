@@ -5,6 +5,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use n3p::geometry::Pose;
 use n3p::lab::training::foresight::{ForesightConfig, load, train};
 use n3p::n3p::{GuidedPlanner, Models, ModelsError};
 use n3p::planners::{Budget, HybridAStarConfig, Planner, Problem};
@@ -17,8 +18,8 @@ use n3p::selectors::foresight::{
 use n3p::selectors::knn::KnnSelector;
 use n3p::selectors::network::LayerWeights;
 use n3p::vehicle::Vehicle;
-use n3p::world::ParkingType;
 use n3p::world::generate::some_wide;
+use n3p::world::{ParkingType, Scene};
 use rand::RngExt;
 
 fn plain(columns: usize) -> Normaliser {
@@ -58,6 +59,41 @@ fn foolish(seed: u64) -> Foresight {
 fn problems(kind: ParkingType, count: usize) -> Vec<Problem> {
     let scenes = some_wide(&Vehicle::default(), kind, 31, count).unwrap();
     scenes.iter().filter_map(|scene| Problem::new(scene).ok()).collect()
+}
+
+/// From the next aisle, or from far down this one, it is as if there were no network.
+#[test]
+fn nobody_asks_a_network_about_cars_that_it_does_not_see() {
+    let knn: Arc<KnnSelector> = Arc::new(KnnSelector::load(Path::new("models/knn.bin")).unwrap());
+    let planner = || {
+        let (config, ranked) = (HybridAStarConfig::default(), Default::default());
+        GuidedPlanner::ranked("n3p", knn.clone(), config, ranked)
+    };
+    let mut without = planner();
+    let mut with = planner().with_foresight(Some(Arc::new(foolish(1))));
+    let box_of = |x0: f64, y0: f64, x1: f64, y1: f64| vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
+    let vehicle = Vehicle::default();
+    let mut same = |start: Pose| {
+        let scene = Scene {
+            vehicle,
+            start,
+            goal: vehicle.rear_axle(Pose::new(0.0, 0.0, std::f64::consts::FRAC_PI_2)),
+            parking_type: Some(ParkingType::Reverse),
+            obstacles: vec![box_of(-4.0, -2.6, -1.3, 2.4), box_of(1.3, -2.6, 4.0, 2.4)],
+            ..Scene::default()
+        };
+        let problem = Problem::new(&scene).unwrap();
+        let plan = |planner: &mut GuidedPlanner| {
+            planner.plan(&problem, Budget::new(200_000)).outcome.unwrap()
+        };
+        plan(&mut without) == plan(&mut with)
+    };
+    for start in [[-25.0, 6.0, 0.0], [22.0, 6.0, 3.1], [-7.0, 16.0, -1.5], [3.0, -20.0, 1.5]] {
+        assert!(same(start.into()), "{start:?}");
+    }
+    // In sight it has a say.
+    let mut starts = (0..40).map(|i| Pose::new(-12.0 + 0.5 * f64::from(i), 6.5, 0.05));
+    assert!(starts.any(|start| !same(start)));
 }
 
 #[test]
