@@ -238,7 +238,9 @@ impl GuidedPlanner {
     pub(super) fn look_up(&mut self, problem: &Problem) -> Option<Known> {
         let (known, foreseen) = self.look_ahead(problem);
         let known = known.or_else(|| self.by_estimates(problem));
-        let known = known.or_else(|| self.by_way(problem))?;
+        // A roundabout way that nobody foresaw may be far longer than what a search would find.
+        let will_do = |known: &Known| foreseen.is_some() || known.cost <= USUAL * known.least;
+        let known = known.or_else(|| self.by_way(problem).filter(will_do))?;
         Some(Known { foreseen, ..known })
     }
 
