@@ -331,6 +331,7 @@ impl GuidedPlanner {
         let prepared = &libraries[0];
         let model = hars.cost(&problem.vehicle);
         let (Checked { common, rare }, any) = (checked, f64::INFINITY);
+        let mut least_of_all = any;
         let parts = [
             (&prepared.library, common, prepared.straights),
             (&prepared.rare, rare, prepared.rare.len()),
@@ -338,7 +339,8 @@ impl GuidedPlanner {
         parts.into_iter().find_map(|(library, verdicts, manoeuvres)| {
             let mut look_up = library_search.look_up(library, verdicts, problem, &model, any);
             let least = least(problem, &model, look_up.least_estimates(manoeuvres));
-            look_up.by_way(any, TWO_MOTIONS).map(|plan| rarely_used(plan, least))
+            least_of_all = least_of_all.min(least);
+            look_up.by_way(any, TWO_MOTIONS).map(|plan| rarely_used(plan, least_of_all))
         })
     }
 
