@@ -267,8 +267,11 @@ impl GuidedPlanner {
             return (known.path, known.guidance);
         }
         let mut standard = Standard::new(problem);
-        let mut is_usual = self.is_usual(&known, &mut standard);
         let apart = problem.start.distance(problem.goal) / problem.vehicle.length;
+        if apart < NEAR_GOAL {
+            known = self.or_common(problem, known);
+        }
+        let mut is_usual = self.is_usual(&known, &mut standard);
         let may_go_on = problem.starts_at_the_spot() || (apart < NEAR_GOAL && !is_usual);
         if !is_usual || (may_go_on && known.cost > standard.enough(&mut self.hars)) {
             let (path, guidance) = self.or_direct(problem, (known.path, known.guidance));

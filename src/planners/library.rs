@@ -437,14 +437,14 @@ impl LookUp<'_> {
     }
 
     /// The cheapest plan by one of the next `tries` free manoeuvres, if it costs less than `bound`, however
-    /// much more that is than estimated.
-    pub fn cheapest_of(&mut self, mut bound: f64, tries: usize) -> Option<LibraryPlan> {
+    /// much more that is than estimated; or up to `slack` less.
+    pub fn cheapest_of(&mut self, mut bound: f64, slack: f64, tries: usize) -> Option<LibraryPlan> {
         self.queue();
         let last = self.search.free.len().saturating_add(tries);
         let mut best = None;
         while self.search.free.len() < last
             && let Some(&Reverse(candidate)) = self.search.queue.peek()
-            && candidate.estimate() < bound
+            && candidate.estimate() < bound + slack
         {
             self.search.queue.pop();
             if self.is_free(candidate) {

@@ -312,7 +312,7 @@ impl GuidedPlanner {
                 foreseen: known.foreseen,
                 ..rarely_used(plan, known.least)
             };
-            if let Some(plan) = look_up.cheapest_of(known.cost, FURTHER) {
+            if let Some(plan) = look_up.cheapest_of(known.cost, 0.0, FURTHER) {
                 known = better(plan, known);
             }
             if known.is_off_foreseen()
@@ -322,6 +322,28 @@ impl GuidedPlanner {
             }
         }
         known
+    }
+
+    /// What is known, or, where it costs far more than the estimate, what more manoeuvres in common use give for
+    /// less, whatever is foreseen: who replans near the goal goes on.
+    pub(super) fn or_common(&mut self, problem: &Problem, known: Known) -> Known {
+        let Self { libraries, library_search, checked, hars, .. } = self;
+        let prepared = libraries.first().filter(|p| p.serves(problem));
+        let Some(prepared) = prepared.filter(|_| known.cost > TRUSTED * known.least) else {
+            return known;
+        };
+        let model = hars.cost(&problem.vehicle);
+        let (library, verdicts, any) = (&prepared.library, &mut checked.common, f64::INFINITY);
+        let mut look_up = library_search.look_up(library, verdicts, problem, &model, any);
+        // Estimates are coarse so near: the least turn too much for their table is two changes of gear.
+        let slack = 2.0 * model.gear_change;
+        match look_up.cheapest_of(known.cost, slack, usize::MAX) {
+            Some(plan) => {
+                let foreseen = known.foreseen;
+                Known { foreseen, ..prepared.known(plan, known.least) }
+            }
+            None => known,
+        }
     }
 
     /// A plan by way of another pose, for where no curve from the start joins a manoeuvre: by one of those in
