@@ -269,7 +269,7 @@ impl GuidedPlanner {
         let mut standard = Standard::new(problem);
         let apart = problem.start.distance(problem.goal) / problem.vehicle.length;
         if apart < NEAR_GOAL {
-            known = self.or_common(problem, known);
+            known = self.or_beside(problem, known);
         }
         let mut is_usual = self.is_usual(&known, &mut standard);
         let may_go_on = problem.starts_at_the_spot() || (apart < NEAR_GOAL && !is_usual);

@@ -35,6 +35,8 @@ mod tests;
 /// Free manoeuvres tried for something cheaper than a plan, and by which share at least.
 const BETTER: usize = 10;
 const GAIN: f64 = 0.03;
+/// Manoeuvres begin beside the start within so many turning radii.
+const BESIDE: f64 = 0.6;
 /// Manoeuvres prepared for one footprint and one cost model.
 #[derive(Clone, Debug)]
 pub struct Library {
@@ -436,15 +438,37 @@ impl LookUp<'_> {
         self.next(cost * (1.0 - GAIN), BETTER)
     }
 
+    /// The cheapest plan by one of the manoeuvres that begin beside the start, if it costs less than `bound`:
+    /// so near estimates are too coarse to choose by.
+    pub fn cheapest_beside(&mut self, mut bound: f64) -> Option<LibraryPlan> {
+        let near = BESIDE * self.problem.vehicle.turning_radius();
+        let start = self.end.relative(self.problem.start);
+        let mut best = None;
+        for (index, manoeuvre) in self.library.manoeuvres.iter().enumerate() {
+            let Entry { pose, .. } = manoeuvre.entry;
+            if pose.distance(start) > near {
+                continue;
+            }
+            let candidate = Candidate::new(self.search.estimates[index], index);
+            if self.is_free(candidate)
+                && let Some((word, cost)) = self.joint(candidate, bound)
+            {
+                bound = cost;
+                best = Some((candidate, word));
+            }
+        }
+        best.map(|(candidate, word)| self.plan(candidate, word, bound))
+    }
+
     /// The cheapest plan by one of the next `tries` free manoeuvres, if it costs less than `bound`, however
-    /// much more that is than estimated; or up to `slack` less.
-    pub fn cheapest_of(&mut self, mut bound: f64, slack: f64, tries: usize) -> Option<LibraryPlan> {
+    /// much more that is than estimated.
+    pub fn cheapest_of(&mut self, mut bound: f64, tries: usize) -> Option<LibraryPlan> {
         self.queue();
         let last = self.search.free.len().saturating_add(tries);
         let mut best = None;
         while self.search.free.len() < last
             && let Some(&Reverse(candidate)) = self.search.queue.peek()
-            && candidate.estimate() < bound + slack
+            && candidate.estimate() < bound
         {
             self.search.queue.pop();
             if self.is_free(candidate) {

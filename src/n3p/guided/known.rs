@@ -312,7 +312,7 @@ impl GuidedPlanner {
                 foreseen: known.foreseen,
                 ..rarely_used(plan, known.least)
             };
-            if let Some(plan) = look_up.cheapest_of(known.cost, 0.0, FURTHER) {
+            if let Some(plan) = look_up.cheapest_of(known.cost, FURTHER) {
                 known = better(plan, known);
             }
             if known.is_off_foreseen()
@@ -324,9 +324,9 @@ impl GuidedPlanner {
         known
     }
 
-    /// What is known, or, where it costs far more than the estimate, what more manoeuvres in common use give for
-    /// less, whatever is foreseen: who replans near the goal goes on.
-    pub(super) fn or_common(&mut self, problem: &Problem, known: Known) -> Known {
+    /// What is known, or, where it costs far more than the estimate, what a manoeuvre in common use that begins
+    /// beside the start gives for less, whatever is foreseen: who replans near the goal goes on.
+    pub(super) fn or_beside(&mut self, problem: &Problem, known: Known) -> Known {
         let Self { libraries, library_search, checked, hars, .. } = self;
         let prepared = libraries.first().filter(|p| p.serves(problem));
         let Some(prepared) = prepared.filter(|_| known.cost > TRUSTED * known.least) else {
@@ -335,9 +335,7 @@ impl GuidedPlanner {
         let model = hars.cost(&problem.vehicle);
         let (library, verdicts, any) = (&prepared.library, &mut checked.common, f64::INFINITY);
         let mut look_up = library_search.look_up(library, verdicts, problem, &model, any);
-        // Estimates are coarse so near: the least turn too much for their table is two changes of gear.
-        let slack = 2.0 * model.gear_change;
-        match look_up.cheapest_of(known.cost, slack, usize::MAX) {
+        match look_up.cheapest_beside(known.cost) {
             Some(plan) => {
                 let foreseen = known.foreseen;
                 Known { foreseen, ..prepared.known(plan, known.least) }

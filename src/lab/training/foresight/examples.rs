@@ -201,7 +201,7 @@ impl Pupil {
         best = best.min(known);
         verdicts.clear();
         let mut look_up = search.look_up(&prepared.rare, verdicts, problem, model, best);
-        if let Some(plan) = look_up.cheapest_of(best, 0.0, usize::MAX) {
+        if let Some(plan) = look_up.cheapest_of(best, usize::MAX) {
             best = plan.cost;
         }
         let unit = vehicle.turning_radius();
