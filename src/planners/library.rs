@@ -36,7 +36,7 @@ mod tests;
 const BETTER: usize = 10;
 const GAIN: f64 = 0.03;
 /// Manoeuvres begin beside the start within so many turning radii.
-const BESIDE: f64 = 0.6;
+const BEGIN_BESIDE: f64 = 0.6;
 /// Manoeuvres prepared for one footprint and one cost model.
 #[derive(Clone, Debug)]
 pub struct Library {
@@ -441,7 +441,7 @@ impl LookUp<'_> {
     /// The cheapest plan by one of the manoeuvres that begin beside the start, if it costs less than `bound`:
     /// so near estimates are too coarse to choose by.
     pub fn cheapest_beside(&mut self, mut bound: f64) -> Option<LibraryPlan> {
-        let near = BESIDE * self.problem.vehicle.turning_radius();
+        let near = BEGIN_BESIDE * self.problem.vehicle.turning_radius();
         let start = self.end.relative(self.problem.start);
         let mut best = None;
         for (index, manoeuvre) in self.library.manoeuvres.iter().enumerate() {

@@ -38,6 +38,8 @@ const DEAR: f64 = 3.0;
 pub(super) const DEAR_BY_UNUSUAL: f64 = 2.0;
 /// What costs about as much as foreseen may cost so many times these limits.
 const TRUSTED: f64 = 1.5;
+/// Near the goal what costs so many times the estimate is doubted, whatever is foreseen.
+const DOUBTED: f64 = 1.5;
 /// Changes of gear that a parallel spot takes at most as a rule, and a bay.
 const TO_AND_FRO: usize = 4;
 const INTO_A_BAY: usize = 2;
@@ -112,14 +114,29 @@ impl Prepared {
         library.manoeuvres().map(values).collect()
     }
 
-    /// A plan by one of its manoeuvres.
+    /// A plan by one of its manoeuvres in common use.
     pub(super) fn known(&self, plan: LibraryPlan, least: f64) -> Known {
-        let is_straight = plan.manoeuvre >= self.straights;
-        let preparatory = (!is_straight).then_some(plan.preparatory);
-        let route = if is_straight { Route::Direct } else { Route::Library };
-        let guidance = Guidance { preparatory, route };
-        Known { path: plan.path, cost: plan.cost, guidance, least, foreseen: None }
+        known_by(plan, self.straights, least)
     }
+
+    /// Its parts, those in common use first: each with what is known of it in the problem at hand, and how
+    /// many of its manoeuvres are more than the straight into the spot.
+    fn parts<'a>(
+        &'a self,
+        checked: &'a mut Checked,
+    ) -> [(&'a Library, &'a mut Verdicts, usize); 2] {
+        let Checked { common, rare } = checked;
+        [(&self.library, common, self.straights), (&self.rare, rare, self.rare.len())]
+    }
+}
+
+/// A plan by a manoeuvre of a library whose first `manoeuvres` are more than the straight into the spot.
+fn known_by(plan: LibraryPlan, manoeuvres: usize, least: f64) -> Known {
+    let LibraryPlan { path, cost, manoeuvre, preparatory } = plan;
+    let is_straight = manoeuvre >= manoeuvres;
+    let preparatory = (!is_straight).then_some(preparatory);
+    let route = if is_straight { Route::Direct } else { Route::Library };
+    Known { path, cost, guidance: Guidance { preparatory, route }, least, foreseen: None }
 }
 
 /// What plans of one problem are held against, found out once, where it is asked for.
@@ -191,13 +208,6 @@ pub(super) struct Known {
     pub(super) least: f64,
     /// What the best plan was foreseen to cost.
     pub(super) foreseen: Option<f64>,
-}
-
-/// A plan by a manoeuvre that is rarely of use.
-pub(super) fn rarely_used(plan: LibraryPlan, least: f64) -> Known {
-    let LibraryPlan { path, cost, preparatory, .. } = plan;
-    let guidance = Guidance { preparatory: Some(preparatory), route: Route::Library };
-    Known { path, cost, guidance, least, foreseen: None }
 }
 
 /// An estimate of what the best plan costs, by those of the cheapest manoeuvre and of the curve straight
@@ -287,12 +297,12 @@ impl GuidedPlanner {
         least: f64,
     ) -> Option<Known> {
         let Self { libraries, library_search, checked, .. } = self;
-        let (rare, verdicts) = (&libraries[0].rare, &mut checked.rare);
+        let [_, (rare, verdicts, manoeuvres)] = libraries[0].parts(checked);
         let bound = best.as_ref().map_or(f64::INFINITY, |known| known.cost);
         let mut look_up = library_search.look_up(rare, verdicts, problem, model, bound);
         let known = best.as_ref().map(|known| known.cost);
         let Some(plan) = look_up.cheapest(known, bound, TRIES) else { return best };
-        Some(rarely_used(plan, least))
+        Some(known_by(plan, manoeuvres, least))
     }
 
     /// What is known, or what more manoeuvres, and where it is far from what is foreseen others by way of
@@ -301,8 +311,7 @@ impl GuidedPlanner {
         let Self { libraries, library_search, checked, hars, .. } = self;
         let Some(prepared) = libraries.first().filter(|p| p.serves(problem)) else { return known };
         let model = hars.cost(&problem.vehicle);
-        let Checked { common, rare } = checked;
-        for (library, verdicts) in [(&prepared.library, common), (&prepared.rare, rare)] {
+        for (library, verdicts, manoeuvres) in prepared.parts(checked) {
             if known.is_as_foreseen() == Some(true) {
                 break;
             }
@@ -310,7 +319,7 @@ impl GuidedPlanner {
             let mut look_up = library_search.look_up(library, verdicts, problem, &model, any);
             let better = |plan: LibraryPlan, known: Known| Known {
                 foreseen: known.foreseen,
-                ..rarely_used(plan, known.least)
+                ..known_by(plan, manoeuvres, known.least)
             };
             if let Some(plan) = look_up.cheapest_of(known.cost, FURTHER) {
                 known = better(plan, known);
@@ -329,7 +338,7 @@ impl GuidedPlanner {
     pub(super) fn or_beside(&mut self, problem: &Problem, known: Known) -> Known {
         let Self { libraries, library_search, checked, hars, .. } = self;
         let prepared = libraries.first().filter(|p| p.serves(problem));
-        let Some(prepared) = prepared.filter(|_| known.cost > TRUSTED * known.least) else {
+        let Some(prepared) = prepared.filter(|_| known.cost > DOUBTED * known.least) else {
             return known;
         };
         let model = hars.cost(&problem.vehicle);
@@ -350,17 +359,13 @@ impl GuidedPlanner {
         let Self { libraries, library_search, checked, hars, .. } = self;
         let prepared = &libraries[0];
         let model = hars.cost(&problem.vehicle);
-        let (Checked { common, rare }, any) = (checked, f64::INFINITY);
-        let mut least_of_all = any;
-        let parts = [
-            (&prepared.library, common, prepared.straights),
-            (&prepared.rare, rare, prepared.rare.len()),
-        ];
-        parts.into_iter().find_map(|(library, verdicts, manoeuvres)| {
+        let (mut least_of_all, any) = (f64::INFINITY, f64::INFINITY);
+        prepared.parts(checked).into_iter().find_map(|(library, verdicts, manoeuvres)| {
             let mut look_up = library_search.look_up(library, verdicts, problem, &model, any);
             let least = least(problem, &model, look_up.least_estimates(manoeuvres));
             least_of_all = least_of_all.min(least);
-            look_up.by_way(any, TWO_MOTIONS).map(|plan| rarely_used(plan, least_of_all))
+            let plan = look_up.by_way(any, TWO_MOTIONS)?;
+            Some(known_by(plan, manoeuvres, least_of_all))
         })
     }
 
