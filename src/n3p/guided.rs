@@ -266,7 +266,7 @@ impl GuidedPlanner {
         if effort == Effort::First {
             return (known.path, known.guidance);
         }
-        let mut standard = Standard::new(problem);
+        let mut standard = Standard::new(problem, self.is_familiar(problem));
         let apart = problem.start.distance(problem.goal) / problem.vehicle.length;
         if apart < NEAR_GOAL {
             known = self.or_beside(problem, known);
@@ -291,7 +291,11 @@ impl GuidedPlanner {
         let Known { path, mut guidance, least, foreseen, .. } = known;
         let before = *left;
         let goal = standard.goal(&self.hars).clone();
-        let mut refined = self.hars.cut(problem, path.clone()).0;
+        let mut refined = if standard.is_familiar {
+            self.hars.cut(problem, path.clone()).0
+        } else {
+            self.hars.refine(problem, &goal, path.clone(), Effort::Usual, None, left)
+        };
         let cost = self.path_cost(problem, &refined);
         let limit = foreseen.map_or(DEAR_BY_UNUSUAL * least, |f| FAR_FROM_FORESEEN * f);
         let is_dear = cost > limit
@@ -372,7 +376,7 @@ impl GuidedPlanner {
     ) -> Path {
         let refined = self.hars.refine(problem, goal, path, effort, Some(spent), left);
         let is_fine = refined.direction_changes() <= most_changes(problem.kind);
-        if effort == Effort::First || is_fine || !Standard::new(problem).is_unusual() {
+        if effort == Effort::First || is_fine || !Standard::new(problem, false).is_unusual() {
             return refined;
         }
         self.or_searched(problem, goal, refined, UNUSUAL_SEARCH, true, left)

@@ -73,7 +73,7 @@ impl Effort {
     /// Expansions, of `left`, for something better than a path that took `spent`, or than one that was
     /// known: what many searches found elsewhere is good as a rule.
     pub(crate) fn patience(self, spent: Option<usize>, left: usize) -> usize {
-        const KNOWN: usize = 120;
+        const KNOWN: usize = 10_000;
         const LEAST: usize = 400;
         match self {
             Effort::First => 0,

@@ -19,7 +19,8 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use self::free_space::{FREE, SWEPT, free_space, is_in_sight, swept};
+pub(crate) use self::free_space::is_in_sight;
+use self::free_space::{FREE, SWEPT, free_space, swept};
 use super::artefact::{self, ArtefactError, Fault};
 use super::network::{LayerWeights, Network};
 use super::{Normaliser, tensor_file};
@@ -204,11 +205,6 @@ impl Foresight {
             bias.push(code[CODE]);
         }
         Codes { worth: Network::new(&[CODE, count], &[LayerWeights { weight, bias }]), count }
-    }
-
-    /// Whether the car starts within what is seen of the lane: it has learnt of no others.
-    pub fn sees(&self, problem: &Problem, stance: Stance) -> bool {
-        is_in_sight(stance, &problem.vehicle, problem.start)
     }
 
     /// Looks at the scene of a problem.

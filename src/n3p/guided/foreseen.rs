@@ -1,11 +1,9 @@
 //! What `n3p` foresees: which known manoeuvres to try first, and what a plan may cost.
 
-use std::sync::Arc;
-
 use super::GuidedPlanner;
-use super::known::{DEEPER, Known, USUAL, least};
+use super::known::{Known, USUAL, is_in_sight, least};
 use crate::planners::Problem;
-use crate::selectors::foresight::{Codes, Foresight, Outlook};
+use crate::selectors::foresight::{Codes, Outlook};
 
 /// So many of the most promising manoeuvres are tried.
 const PROMISING: usize = 16;
@@ -64,10 +62,7 @@ impl GuidedPlanner {
     pub(super) fn look_ahead(&mut self, problem: &Problem) -> (Option<Known>, Option<f64>) {
         let Self { libraries, library_search, checked, hars, foresight, ranking, .. } = self;
         let prepared = &libraries[0];
-        // It has not learnt of deeper bays, nor of cars that come from where it does not see.
-        let is_deeper = problem.mouth > DEEPER * problem.vehicle.scale();
-        let sees = |foresight: &&Arc<Foresight>| foresight.sees(problem, prepared.stance);
-        let foresight = foresight.as_ref().filter(sees).filter(|_| !is_deeper);
+        let foresight = foresight.as_ref().filter(|_| is_in_sight(problem));
         let Some((foresight, codes)) = foresight.zip(prepared.codes.as_ref()) else {
             return (None, None);
         };

@@ -40,6 +40,8 @@ pub(super) const DEAR_BY_UNUSUAL: f64 = 2.0;
 const TRUSTED: f64 = 1.5;
 /// Near the goal what costs so many times the estimate is doubted, whatever is foreseen.
 const DOUBTED: f64 = 1.5;
+/// Where nothing was learnt only what costs so many times the estimate is taken as it is.
+const USUAL_ANYWHERE: f64 = 1.15;
 /// Changes of gear that a parallel spot takes at most as a rule, and a bay.
 const TO_AND_FRO: usize = 4;
 const INTO_A_BAY: usize = 2;
@@ -139,17 +141,39 @@ fn known_by(plan: LibraryPlan, manoeuvres: usize, least: f64) -> Known {
     Known { path, cost, guidance: Guidance { preparatory, route }, least, foreseen: None }
 }
 
+/// Whether cars were seen to come from such starts when what is known was learnt: in sight of a spot that is
+/// no deeper than usual.
+pub(super) fn is_in_sight(problem: &Problem) -> bool {
+    let is_deeper = problem.mouth > DEEPER * problem.vehicle.scale();
+    let in_sight = |stance| foresight::is_in_sight(stance, &problem.vehicle, problem.start);
+    problem.stance().is_some_and(in_sight) && !is_deeper
+}
+
+/// Whether something beside the spot, or in it, leaves less room there than the widest usual spot has: where
+/// nothing does, who comes from afar need not change gears to get in.
+fn is_bounded(problem: &Problem) -> bool {
+    let grid = Grid::default().scaled(problem.vehicle.scale());
+    let bounds = |stance: Stance| {
+        let widest = grid.spot_width(stance.kind()).max;
+        let found = abstractions(problem.around_spot(), stance, &grid);
+        found.iter().any(|around| around.cell.spot_width < widest)
+    };
+    problem.stance().is_some_and(bounds)
+}
+
 /// What plans of one problem are held against, found out once, where it is asked for.
 pub(super) struct Standard<'a> {
     problem: &'a Problem,
+    /// Whether what was learnt has a say about what a plan costs.
+    pub(super) is_familiar: bool,
     goal: OnceCell<GoalSet>,
     least: Option<f64>,
     unusual: Option<bool>,
 }
 
 impl<'a> Standard<'a> {
-    pub(super) fn new(problem: &'a Problem) -> Self {
-        Self { problem, goal: OnceCell::new(), least: None, unusual: None }
+    pub(super) fn new(problem: &'a Problem, is_familiar: bool) -> Self {
+        Self { problem, is_familiar, goal: OnceCell::new(), least: None, unusual: None }
     }
 
     /// Where plans may end.
@@ -243,6 +267,12 @@ pub(super) fn most_changes(kind: Option<ParkingType>) -> usize {
 }
 
 impl GuidedPlanner {
+    /// Whether what was learnt has a say about what a plan costs in such problems.
+    pub(super) fn is_familiar(&self, problem: &Problem) -> bool {
+        (is_in_sight(problem) || is_bounded(problem))
+            && self.libraries.first().is_none_or(|own| own.straights > 0)
+    }
+
     /// The cheapest of what is known without a search, as foreseen, or else as estimates say, or else by way
     /// of another pose.
     pub(super) fn look_up(&mut self, problem: &Problem) -> Option<Known> {
@@ -428,11 +458,15 @@ impl GuidedPlanner {
     /// Whether a plan costs no more than usual: little more than the least through empty space, or about
     /// what was foreseen, if anything was, and then half as much again as [`dear`] allows over the library's
     /// estimate. With the usual changes of gear that is much, since manoeuvres for them were learnt in many worlds; by an
-    /// unusual spot it is at most twice the estimate.
+    /// unusual spot it is at most twice the estimate, and where nothing was learnt little more than it.
     pub(super) fn is_usual(&mut self, known: &Known, standard: &mut Standard) -> bool {
         // The library's estimate is at hand, the other one takes a tenth of a plan.
-        if known.cost <= USUAL * known.least || known.cost <= standard.enough(&mut self.hars) {
+        let usual = if standard.is_familiar { USUAL } else { USUAL_ANYWHERE };
+        if known.cost <= usual * known.least || known.cost <= standard.enough(&mut self.hars) {
             return true;
+        }
+        if !standard.is_familiar {
+            return false;
         }
         let times = known.cost / known.least.max(standard.least(&mut self.hars));
         let trust = match known.is_as_foreseen() {

@@ -22,8 +22,8 @@ const FAR_IN_SPOT: f64 = 1.0;
 /// Poses of a manoeuvre that are looked at lie so far apart.
 const STRIDE: f64 = 0.08;
 
-/// Whether a pose lies within what is seen of the lane.
-pub(super) fn is_in_sight(stance: Stance, vehicle: &Vehicle, pose: Pose) -> bool {
+/// Whether a pose lies within what is seen of the lane: of cars that start elsewhere nothing was learnt.
+pub(crate) fn is_in_sight(stance: Stance, vehicle: &Vehicle, pose: Pose) -> bool {
     let seen = Layout::new(stance, vehicle).in_lane(pose.position());
     seen.x.abs() <= REACH && seen.y.abs() <= FAR
 }
