@@ -227,15 +227,20 @@ impl HybridAStarConfig {
     ///
     /// On each lattice the domain grows while there is no way within it; and a search that does
     /// not come to an end soon begins anew, careful of gaps that the car does not pass and, on the
-    /// coarsest lattice, in strides twice as long.
+    /// coarsest lattice, in strides twice as long; where `either_way` is asked for first from the start to the
+    /// goal: it may be the start that is hard to come by.
     pub(super) fn coarse_to_fine<T>(
         &self,
         domains: &[Aabb],
+        either_way: bool,
         expansions: &mut usize,
         mut search: impl FnMut(Attempt, &mut usize) -> Result<T, NoPath>,
     ) -> Result<T, NoPath> {
         /// Of what a lattice may spend, the part for the first look.
         const FIRST_LOOK: usize = 8;
+        /// Of what is left then, the part for the search from the goal: where it has not found a way soon, the
+        /// other one does more often (of 179 scenes without a path within the budget 68 against 0).
+        const FROM_GOAL: usize = 4;
         let mut result = Err(NoPath::BudgetSpent);
         let mut domain = 0;
         for (i, resolution) in self.resolutions.iter().enumerate() {
@@ -246,7 +251,13 @@ impl HybridAStarConfig {
                 let later = *expansions - *expansions / FIRST_LOOK;
                 *expansions -= later;
                 let (config, within) = (self, domains[domain]);
-                let first = Attempt { config, resolution, domain: within, careful: false };
+                let first = Attempt {
+                    config,
+                    resolution,
+                    domain: within,
+                    careful: false,
+                    from_start: false,
+                };
                 result = search(first, expansions);
                 *expansions += later;
                 let grows = domain + 1 < domains.len();
@@ -261,6 +272,15 @@ impl HybridAStarConfig {
                             careful: true,
                             ..first
                         };
+                        if either_way {
+                            let later = *expansions / FROM_GOAL;
+                            *expansions -= later;
+                            result = search(Attempt { from_start: true, ..again }, expansions);
+                            *expansions += later;
+                            if result.is_ok() {
+                                break;
+                            }
+                        }
                         result = search(again, expansions);
                         if !matches!(result, Err(NoPath::Enclosed | NoPath::Exhausted))
                             || domain + 1 == domains.len()
@@ -292,6 +312,8 @@ pub(super) struct Attempt<'a> {
     pub domain: Aabb,
     /// Whether its cost-to-go shuns gaps in which the car fits at no heading.
     pub careful: bool,
+    /// Whether it runs from the start to the goal, instead of from the goal to the start.
+    pub from_start: bool,
 }
 
 #[cfg(test)]

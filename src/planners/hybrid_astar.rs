@@ -212,8 +212,12 @@ impl HybridAStar {
     ) -> Result<Leg, NoPath> {
         let mut best = direct;
         let config = self.config.for_search(&problem.vehicle)?;
-        let result = config.coarse_to_fine(domains, expansions, |attempt, expansions| {
-            let result = self.search_leg(attempt, problem, start, goal, &mut best, expansions);
+        let result = config.coarse_to_fine(domains, true, expansions, |attempt, expansions| {
+            let result = if attempt.from_start {
+                self.search_from_start(attempt, problem, start, goal, &mut best, expansions)
+            } else {
+                self.search_leg(attempt, problem, start, goal, &mut best, expansions)
+            };
             if best.is_some() { Ok(()) } else { result }
         });
         result.map(|()| best.expect("a search that succeeds leaves a leg"))
@@ -254,6 +258,30 @@ impl HybridAStar {
             self.queue.expand(node, goal, attempt.config, problem);
         }
         Err(self.queue.stop())
+    }
+
+    /// The same from the start to the goal itself: the way back, driven in reverse.
+    fn search_from_start(
+        &mut self,
+        attempt: Attempt,
+        problem: &Problem,
+        start: Pose,
+        goal: &GoalSet,
+        best: &mut Option<Leg>,
+        expansions: &mut usize,
+    ) -> Result<(), NoPath> {
+        let entry = &goal.entries()[0];
+        let mut back = None;
+        let back_to = GoalSet::single(start);
+        let result = self.search_leg(attempt, problem, entry.pose, &back_to, &mut back, expansions);
+        if let Some(back) = back {
+            let mut path = back.path.reversed();
+            path.extend(entry.rest.iter().copied());
+            let path = Path { start, ..path };
+            let cost = attempt.config.cost.path(&problem.vehicle, &path.segments);
+            *best = Some(Leg { path, cost, entry: 0 });
+        }
+        result
     }
 
     /// One search from the start of `problem` for something cheaper than `best`, until nothing much
@@ -335,7 +363,8 @@ impl HybridAStar {
             domain = domain.inflated(config.resolutions[0].cell / 2.0);
         }
         let resolution = &config.resolutions[0];
-        let attempt = Attempt { config: &config, resolution, domain, careful: false };
+        let attempt =
+            Attempt { config: &config, resolution, domain, careful: false, from_start: false };
         let share = effort.patience(spent, *left);
         let mut spend = share;
         let mut best = Some(Leg { path: path.clone(), cost, entry: 0 });

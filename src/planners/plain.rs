@@ -73,7 +73,7 @@ impl Planner for PlainHybridAStar {
         let goal = config.goal_set(problem);
         let domains = config.domains(problem, problem.start, problem.goal);
         let mut left = budget.max_expansions;
-        let path = config.coarse_to_fine(&domains, &mut left, |attempt, left| {
+        let path = config.coarse_to_fine(&domains, false, &mut left, |attempt, left| {
             self.search(attempt, problem, &goal, left)
         });
         let expansions = budget.max_expansions - left;

@@ -104,7 +104,7 @@ impl Search {
 
     /// Starts a search from `goal` to `start`.
     pub fn begin(&mut self, attempt: Attempt, problem: &Problem, start: Pose, goal: &GoalSet) {
-        let Attempt { config, resolution, domain, careful } = attempt;
+        let Attempt { config, resolution, domain, careful, .. } = attempt;
         let vehicle = &problem.vehicle;
         self.start = start;
         self.per_curve = 4.0 * vehicle.scale() as f32;

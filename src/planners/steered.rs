@@ -48,7 +48,7 @@ pub(super) fn first_accepted(
     // Where the wheels may stand as they like when the curve ends.
     let at_changes = turning.is_none_or(|turning| turning.at_changes);
     // What became of it is with `accept`.
-    let _ = config.coarse_to_fine(&domains, expansions, |attempt, expansions| {
+    let _ = config.coarse_to_fine(&domains, false, expansions, |attempt, expansions| {
         queue.begin(attempt, problem, problem.start, &goal);
         while let Some(node) = queue.pop() {
             if *expansions == 0 {
