@@ -9,6 +9,7 @@ use n3p::n3p::{Method, MethodSettings, Models};
 use n3p::output::PathFile;
 use n3p::planners::{Budget, HybridAStarConfig, Planner, Problem};
 use n3p::vehicle::Vehicle;
+use n3p::world::clutter::clutter;
 use n3p::world::generate::{GeneratorConfig, generate};
 use n3p::world::{Level, ParkingType, Scene};
 
@@ -231,4 +232,42 @@ fn narrow_doors_and_long_ways_round_are_found() {
         let path = plan(planner(method, &[]).as_mut(), &round);
         assert!(path.length() < 75.0, "{method}: {}", path.length());
     }
+}
+
+#[test]
+fn a_start_that_is_hard_to_come_by_is_left() {
+    // Searches from the goal spend their budget.
+    let mut planners =
+        [Method::HA_RS, Method::HA_HOLD, Method::MHHA].map(|method| planner(method, &[]));
+    let scene = clutter(20_261_128, 1863);
+    for planner in &mut planners {
+        plan(planner.as_mut(), &scene);
+    }
+}
+
+#[test]
+fn among_anything_known_manoeuvres_and_curves_are_held_against_what_searches_find() {
+    let usual = [Method::N3P, Method::HA_RS, Method::HA_HOLD];
+    let mut planners = usual.map(|method| {
+        let models = Models::usual(&[method], None).unwrap();
+        method.build(&models, &MethodSettings::default()).unwrap()
+    });
+    let mut over_best = Vec::new();
+    for number in 0..300 {
+        let scene = clutter(77, number);
+        let Ok(problem) = Problem::new(&scene) else { continue };
+        let costs = planners.each_mut().map(|planner| {
+            let path = planner.plan(&problem, BUDGET).outcome;
+            path.map_or(f64::INFINITY, |path| cost(&path, &scene.vehicle))
+        });
+        let best = costs.iter().copied().fold(f64::INFINITY, f64::min);
+        if best.is_finite() {
+            over_best.push(costs[0] / best);
+        }
+    }
+    over_best.sort_by(f64::total_cmp);
+    let (count, worst) = (over_best.len(), over_best[over_best.len() - 1]);
+    let (median, p95) = (over_best[count / 2], over_best[count * 95 / 100]);
+    println!("{count} scenes: cost over best {median:.3}, {p95:.3}, {worst:.2}");
+    assert!(count >= 290 && median <= 1.02 && p95 <= 1.15, "{count}: {median}, {p95}, {worst}");
 }
