@@ -227,8 +227,9 @@ impl HybridAStarConfig {
     ///
     /// On each lattice the domain grows while there is no way within it; and a search that does
     /// not come to an end soon begins anew, careful of gaps that the car does not pass and, on the
-    /// coarsest lattice, in strides twice as long; where `either_way` is asked for first from the start to the
-    /// goal: it may be the start that is hard to come by.
+    /// coarsest lattice, in strides twice as long. Where even that does not come to an end, the finest lattice
+    /// would not either: if `either_way` will do, such strides are tried from the start to the goal first, since
+    /// it may be the start that is hard to come by.
     pub(super) fn coarse_to_fine<T>(
         &self,
         domains: &[Aabb],
@@ -238,15 +239,22 @@ impl HybridAStarConfig {
     ) -> Result<T, NoPath> {
         /// Of what a lattice may spend, the part for the first look.
         const FIRST_LOOK: usize = 8;
-        /// Of what is left then, the part for the search from the goal: where it has not found a way soon, the
-        /// other one does more often (of 179 scenes without a path within the budget 68 against 0).
-        const FROM_GOAL: usize = 4;
         let mut result = Err(NoPath::BudgetSpent);
         let mut domain = 0;
         for (i, resolution) in self.resolutions.iter().enumerate() {
             let last = i + 1 == self.resolutions.len();
             let reserve = if last { 0 } else { *expansions / 2 };
             *expansions -= reserve;
+            if last && either_way && matches!(result, Err(NoPath::BudgetSpent)) {
+                let (resolution, domain) = (&self.resolutions[0].doubled(), domains[domain]);
+                let config = self;
+                let careful_from_start =
+                    Attempt { config, resolution, domain, careful: true, from_start: true };
+                result = search(careful_from_start, expansions);
+                if result.is_ok() {
+                    break;
+                }
+            }
             loop {
                 let later = *expansions - *expansions / FIRST_LOOK;
                 *expansions -= later;
@@ -272,15 +280,6 @@ impl HybridAStarConfig {
                             careful: true,
                             ..first
                         };
-                        if either_way {
-                            let later = *expansions / FROM_GOAL;
-                            *expansions -= later;
-                            result = search(Attempt { from_start: true, ..again }, expansions);
-                            *expansions += later;
-                            if result.is_ok() {
-                                break;
-                            }
-                        }
                         result = search(again, expansions);
                         if !matches!(result, Err(NoPath::Enclosed | NoPath::Exhausted))
                             || domain + 1 == domains.len()
