@@ -2,6 +2,8 @@
 
 #![cfg(feature = "lab")]
 
+use std::f64::consts::{FRAC_PI_2, TAU};
+
 use n3p::curves::Path;
 use n3p::geometry::Pose;
 use n3p::lab::evaluation::oracle;
@@ -270,4 +272,32 @@ fn among_anything_known_manoeuvres_and_curves_are_held_against_what_searches_fin
     let (median, p95) = (over_best[count / 2], over_best[count * 95 / 100]);
     println!("{count} scenes: cost over best {median:.3}, {p95:.3}, {worst:.2}");
     assert!(count >= 290 && median <= 1.02 && p95 <= 1.15, "{count}: {median}, {p95}, {worst}");
+}
+
+#[test]
+fn where_nothing_bounds_the_spot_nobody_is_sent_to_and_fro() {
+    let models = Models::usual(&[Method::N3P], None).unwrap();
+    let mut n3p = Method::N3P.build(&models, &MethodSettings::default()).unwrap();
+    let mut hars = planner(Method::HA_RS, &[]);
+    let vehicle = Vehicle::default();
+    let anywhere = Scene {
+        obstacles: Vec::new(),
+        polylines: Vec::new(),
+        points: Vec::new(),
+        bounds: None,
+        vehicle,
+        ..clutter(77, 0)
+    };
+    let goals = [None, Some(ParkingType::Parallel), Some(ParkingType::Forward)];
+    for (i, parking_type) in (0..180).zip(goals.into_iter().cycle()) {
+        let [along, across, turn] = [7.3, 4.1, 2.9].map(|step| step * f64::from(i));
+        let start = Pose::new(along % 16.0 - 8.0, across % 9.0, turn % TAU);
+        let goal = Pose::new(0.0, 0.0, if i % 2 == 0 { 0.0 } else { -FRAC_PI_2 });
+        let name = format!("open {i}");
+        let points = vec![[200.0, 0.0]];
+        let scene = Scene { name, parking_type, points, start, goal, ..anywhere.clone() };
+        let [ours, theirs] =
+            [&mut n3p, &mut hars].map(|p| cost(&plan(p.as_mut(), &scene), &vehicle));
+        assert!(ours <= 1.12 * theirs, "{}: {ours} against {theirs}", scene.name);
+    }
 }

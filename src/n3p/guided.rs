@@ -34,7 +34,7 @@ mod foreseen;
 pub(crate) mod known;
 
 use foreseen::{FAR_FROM_FORESEEN, Ranking};
-use known::{Checked, DEAR_BY_UNUSUAL, Known, Prepared, Standard, most_changes};
+use known::{Checked, DEAR_BY_UNUSUAL, Known, Prepared, Standard, directly, most_changes};
 
 /// Expansions that the paper's two legs may spend, so that a pose just beside the feasible
 /// ones does not use up what the full search needs.
@@ -181,12 +181,11 @@ impl GuidedPlanner {
 
     /// The plan, or the curve straight to the goal where that costs less: a car that is nearly
     /// parked is not sent back to a preparatory pose, and estimates are coarse so near the goal.
-    fn or_direct(&mut self, problem: &Problem, planned: (Path, Guidance)) -> (Path, Guidance) {
-        let cost = self.path_cost(problem, &planned.0);
+    fn or_direct(&mut self, problem: &Problem, known: Known) -> Known {
         let goal = self.hars.goal_set(problem);
-        match self.hars.direct_below(problem, problem.start, &goal, cost) {
-            Some(leg) => (leg.path, Guidance { preparatory: None, route: Route::Direct }),
-            None => planned,
+        match self.hars.direct_below(problem, problem.start, &goal, known.cost) {
+            Some(leg) => Known { foreseen: known.foreseen, ..directly(leg, known.least) },
+            None => known,
         }
     }
 
@@ -274,9 +273,7 @@ impl GuidedPlanner {
         let mut is_usual = self.is_usual(&known, &mut standard);
         let may_go_on = problem.starts_at_the_spot() || (apart < NEAR_GOAL && !is_usual);
         if !is_usual || (may_go_on && known.cost > standard.enough(&mut self.hars)) {
-            let (path, guidance) = self.or_direct(problem, (known.path, known.guidance));
-            let cost = self.path_cost(problem, &path);
-            known = Known { path, cost, guidance, ..known };
+            known = self.or_direct(problem, known);
             if may_go_on {
                 known = self.or_rest(problem, known);
             }
@@ -443,7 +440,12 @@ impl Planner for GuidedPlanner {
         let mut left = budget.max_expansions;
         let planned = match self.strategy {
             Strategy::Paper => match self.plan_paper(problem, &mut left) {
-                Some(planned) => Ok(self.or_direct(problem, planned)),
+                Some((path, guidance)) => {
+                    let cost = self.path_cost(problem, &path);
+                    let known = Known { path, cost, guidance, least: 0.0, foreseen: None };
+                    let Known { path, guidance, .. } = self.or_direct(problem, known);
+                    Ok((path, guidance))
+                }
                 None => self.fall_back(problem, &mut left),
             },
             Strategy::Ranked(config) => {

@@ -88,6 +88,8 @@ pub struct Outlook {
     weight: f32,
     /// What the best plan is foreseen to cost, metres.
     pub cost: f64,
+    /// Whether nothing stands beside the spot: the network has learnt of few such.
+    pub in_the_open: bool,
 }
 
 /// The bytes of a file.
@@ -209,12 +211,14 @@ impl Foresight {
 
     /// Looks at the scene of a problem.
     pub fn look(&self, problem: &Problem, stance: Stance, estimates: [f64; 2]) -> Outlook {
-        let values = self.header.scene.normalise(scene_values(problem, stance, estimates));
+        let seen = scene_values(problem, stance, estimates);
+        let in_the_open = free_space::has_nothing_beside_the_spot(&seen[SCENE - FREE..]);
+        let values = self.header.scene.normalise(seen);
         let out: [f32; CODE + 2] = self.scene.forward(&values);
         let cost = least_cost(&problem.vehicle, estimates) * f64::from(out[CODE + 1]).exp();
         let unit = problem.vehicle.turning_radius() as f32;
         let code = std::array::from_fn(|i| out[i]);
-        Outlook { code, weight: out[CODE] / unit, cost }
+        Outlook { code, weight: out[CODE] / unit, cost, in_the_open }
     }
 }
 

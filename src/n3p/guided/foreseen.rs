@@ -1,7 +1,7 @@
 //! What `n3p` foresees: which known manoeuvres to try first, and what a plan may cost.
 
 use super::GuidedPlanner;
-use super::known::{Known, USUAL, is_in_sight, least};
+use super::known::{Known, USUAL, directly, is_in_sight, least};
 use crate::planners::Problem;
 use crate::selectors::foresight::{Codes, Outlook};
 
@@ -82,6 +82,14 @@ impl GuidedPlanner {
             && let Some(better) = look_up.cheapest(Some(known.cost), any, 0)
         {
             best = Some(prepared.known(better, least));
+        }
+        // Where nothing bounds the spot no change of gear may be needed, whatever is foreseen.
+        if ranking.outlook.in_the_open
+            && let Some(known) = &best
+            && let Some(leg) =
+                hars.direct_below(problem, problem.start, &hars.goal_set(problem), known.cost)
+        {
+            best = Some(directly(leg, least));
         }
         (best, Some(foreseen))
     }

@@ -141,6 +141,12 @@ fn known_by(plan: LibraryPlan, manoeuvres: usize, least: f64) -> Known {
     Known { path, cost, guidance: Guidance { preparatory, route }, least, foreseen: None }
 }
 
+/// The plan that is a curve straight to the goal.
+pub(super) fn directly(Leg { path, cost, .. }: Leg, least: f64) -> Known {
+    let guidance = Guidance { preparatory: None, route: Route::Direct };
+    Known { path, cost, guidance, least, foreseen: None }
+}
+
 /// Whether cars were seen to come from such starts when what is known was learnt: in sight of a spot that is
 /// no deeper than usual.
 pub(super) fn is_in_sight(problem: &Problem) -> bool {
@@ -296,11 +302,8 @@ impl GuidedPlanner {
         let by_manoeuvre = |plan| prepared.known(plan, least);
         let mut best = look_up.next(any, FIRST_TRIES).map(by_manoeuvre);
         if best.is_none() {
-            let guidance = Guidance { preparatory: None, route: Route::Direct };
             let direct = hars.direct(problem, problem.start, &hars.goal_set(problem));
-            let known =
-                |Leg { path, cost, .. }| Known { path, cost, guidance, least, foreseen: None };
-            let direct = direct.map(known);
+            let direct = direct.map(|leg| directly(leg, least));
             let bound = direct.as_ref().map_or(any, |known| known.cost);
             let tries = if direct.is_some() { FIRST_TRIES } else { TRIES };
             best = look_up.next(bound, tries).map(by_manoeuvre).or(direct);

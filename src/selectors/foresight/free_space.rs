@@ -142,6 +142,11 @@ pub(super) fn free_space(problem: &Problem, stance: Stance) -> [f32; FREE] {
     collected(above.into_iter().chain(below).chain(right).chain(left))
 }
 
+/// Whether nothing stands in what is seen of the spot, given a [`free_space`].
+pub(super) fn has_nothing_beside_the_spot(free: &[f32]) -> bool {
+    free[FREE - 2 * ROWS..].iter().all(|to_the_side| f64::from(to_the_side.abs()) >= FAR_IN_SPOT)
+}
+
 /// What the vehicle sweeps in the lane while it drives `motions` to its goal.
 pub(super) fn swept(stance: Stance, vehicle: &Vehicle, motions: &[Segment]) -> [f32; SWEPT] {
     let layout = Layout::new(stance, vehicle);
