@@ -9,7 +9,8 @@
 //! What costs more than usual for its spot and its changes of gear is looked at further, and its corners
 //! are cut, as are those of what passes something near. What then is still far from what was foreseen is
 //! searched for once more; without foresight, what costs more than twice the estimate, by an unusual spot or
-//! with more changes than usual.
+//! with more changes than usual. Where cars come from afar to a goal that nothing bounds, nothing was learnt of
+//! what plans cost: there they are bettered by a search, as searched ones are.
 //! Either way the path leaves certified by the exact swept check.
 
 use std::sync::Arc;
@@ -238,8 +239,7 @@ impl GuidedPlanner {
             && let Some(leg) = self.hars.direct(problem, problem.start, untried)
         {
             let guidance = guidance(untried.entries().get(leg.entry), Route::Direct);
-            let known =
-                Known { path: leg.path, cost: leg.cost, guidance, least: 0.0, foreseen: None };
+            let known = Known::unjudged(leg.path, leg.cost, guidance);
             return Ok(self.settle(problem, known, effort, left));
         }
         // One search: it begins at the goal and at every preparatory pose.
@@ -442,7 +442,7 @@ impl Planner for GuidedPlanner {
             Strategy::Paper => match self.plan_paper(problem, &mut left) {
                 Some((path, guidance)) => {
                     let cost = self.path_cost(problem, &path);
-                    let known = Known { path, cost, guidance, least: 0.0, foreseen: None };
+                    let known = Known::unjudged(path, cost, guidance);
                     let Known { path, guidance, .. } = self.or_direct(problem, known);
                     Ok((path, guidance))
                 }

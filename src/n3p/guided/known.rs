@@ -141,6 +141,13 @@ fn known_by(plan: LibraryPlan, manoeuvres: usize, least: f64) -> Known {
     Known { path, cost, guidance: Guidance { preparatory, route }, least, foreseen: None }
 }
 
+impl Known {
+    /// A plan of which no estimate says what the best costs.
+    pub(super) fn unjudged(path: Path, cost: f64, guidance: Guidance) -> Self {
+        Self { path, cost, guidance, least: 0.0, foreseen: None }
+    }
+}
+
 /// The plan that is a curve straight to the goal.
 pub(super) fn directly(Leg { path, cost, .. }: Leg, least: f64) -> Known {
     let guidance = Guidance { preparatory: None, route: Route::Direct };
@@ -273,7 +280,8 @@ pub(super) fn most_changes(kind: Option<ParkingType>) -> usize {
 }
 
 impl GuidedPlanner {
-    /// Whether what was learnt has a say about what a plan costs in such problems.
+    /// Whether what was learnt has a say about what a plan costs in such problems: the car comes from where cars
+    /// were seen to come from or to a spot that is one, and manoeuvres are known for it.
     pub(super) fn is_familiar(&self, problem: &Problem) -> bool {
         (is_in_sight(problem) || is_bounded(problem))
             && self.libraries.first().is_none_or(|own| own.straights > 0)
