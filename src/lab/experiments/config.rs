@@ -243,7 +243,7 @@ impl ExperimentConfig {
         let value = |message| ConfigError::Value { path: path.to_owned(), message };
         let config = Self { folder: path.with_file_name(""), ..read_settings(Some(path), set)? };
         let written: toml::Table = read_settings(Some(path), set)?;
-        if let Some(key) = misplaced(&written) {
+        if let Some(key) = misplaced(&written, &config) {
             let top = key.rsplit('.').next().unwrap_or(key);
             return Err(value(format!("{key}: set {top} once, at the top of the file, not here")));
         }
@@ -381,23 +381,29 @@ impl ExperimentConfig {
     }
 }
 
-/// A setting that belongs to the top of the file, found in a section.
-fn misplaced(written: &toml::Table) -> Option<&'static str> {
-    let has = |path: &str| {
+/// A setting that belongs to the top of the file, found in a section with another value: a file with every
+/// setting spelt out has them in both places.
+fn misplaced(written: &toml::Table, config: &ExperimentConfig) -> Option<&'static str> {
+    let in_section = |path: &str| {
         let mut parts = path.split('.');
         let first = parts.next().and_then(|p| written.get(p));
         parts.try_fold(first?, |table, part| table.get(part))
     };
+    let seed = toml::Value::try_from(config.seed).ok();
+    let vehicle = toml::Value::try_from(config.vehicle).ok();
     let misplaced = [
-        "collect.seed",
-        "collect.vehicle",
-        "train.knn.seed",
-        "train.mlp.seed",
-        "train.foresight.seed",
-        "train.rl.seed",
-        "train.rl.vehicle",
+        ("collect.seed", &seed),
+        ("collect.vehicle", &vehicle),
+        ("train.knn.seed", &seed),
+        ("train.mlp.seed", &seed),
+        ("train.foresight.seed", &seed),
+        ("train.rl.seed", &seed),
+        ("train.rl.vehicle", &vehicle),
     ];
-    misplaced.into_iter().find(|p| has(p).is_some())
+    let differs = |(path, top): &(&str, &Option<toml::Value>)| {
+        in_section(path).is_some_and(|value| Some(value) != top.as_ref())
+    };
+    misplaced.into_iter().find(differs).map(|(path, _)| path)
 }
 
 fn distinct<T: PartialEq>(
@@ -434,8 +440,11 @@ mod tests {
         assert_eq!((config.collect.seed, config.train.mlp.seed), (7, 7));
         assert_eq!(config.evaluate.types.len(), 3);
         assert!(config.learns() && !config.needs_mlp());
-        let again: ExperimentConfig = toml::from_str(&config.to_toml()).unwrap();
+        let again = read(&config.to_toml()).unwrap();
         assert_eq!(ExperimentConfig { folder: config.folder.clone(), ..again }, config);
+        let other = config.to_toml().replacen("seed = 7", "seed = 8", 1);
+        let error = read(&other).unwrap_err().to_string();
+        assert!(error.contains("collect.seed: set seed once, at the top of the file"), "{error}");
     }
 
     #[test]
