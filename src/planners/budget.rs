@@ -71,7 +71,7 @@ impl Effort {
     }
 
     /// Expansions, of `left`, for something better than a path that took `spent`, or than one that was
-    /// known: what many searches found elsewhere is good as a rule.
+    /// known: nothing was spent on that yet, and a search for something cheaper ends early where there is none.
     pub(crate) fn patience(self, spent: Option<usize>, left: usize) -> usize {
         const KNOWN: usize = 10_000;
         const LEAST: usize = 400;

@@ -242,13 +242,13 @@ impl ExperimentConfig {
     pub fn read(path: &Path, set: &[Setting]) -> Result<Self, ConfigError> {
         let value = |message| ConfigError::Value { path: path.to_owned(), message };
         let config = Self { folder: path.with_file_name(""), ..read_settings(Some(path), set)? };
+        let config = config.resolved();
+        config.validate().map_err(value)?;
         let written: toml::Table = read_settings(Some(path), set)?;
         if let Some(key) = misplaced(&written, &config) {
             let top = key.rsplit('.').next().unwrap_or(key);
             return Err(value(format!("{key}: set {top} once, at the top of the file, not here")));
         }
-        let config = config.resolved();
-        config.validate().map_err(value)?;
         Ok(config)
     }
 

@@ -141,19 +141,6 @@ fn known_by(plan: LibraryPlan, manoeuvres: usize, least: f64) -> Known {
     Known { path, cost, guidance: Guidance { preparatory, route }, least, foreseen: None }
 }
 
-impl Known {
-    /// A plan of which no estimate says what the best costs.
-    pub(super) fn unjudged(path: Path, cost: f64, guidance: Guidance) -> Self {
-        Self { path, cost, guidance, least: 0.0, foreseen: None }
-    }
-}
-
-/// The plan that is a curve straight to the goal.
-pub(super) fn directly(Leg { path, cost, .. }: Leg, least: f64) -> Known {
-    let guidance = Guidance { preparatory: None, route: Route::Direct };
-    Known { path, cost, guidance, least, foreseen: None }
-}
-
 /// Whether cars were seen to come from such starts when what is known was learnt: in sight of a spot that is
 /// no deeper than usual.
 pub(super) fn is_in_sight(problem: &Problem) -> bool {
@@ -245,6 +232,19 @@ pub(super) struct Known {
     pub(super) least: f64,
     /// What the best plan was foreseen to cost.
     pub(super) foreseen: Option<f64>,
+}
+
+impl Known {
+    /// A plan of which no estimate says what the best costs.
+    pub(super) fn unjudged(path: Path, cost: f64, guidance: Guidance) -> Self {
+        Self { path, cost, guidance, least: 0.0, foreseen: None }
+    }
+}
+
+/// The plan that is a curve straight to the goal.
+pub(super) fn directly(Leg { path, cost, .. }: Leg, least: f64) -> Known {
+    let guidance = Guidance { preparatory: None, route: Route::Direct };
+    Known { path, cost, guidance, least, foreseen: None }
 }
 
 /// An estimate of what the best plan costs, by those of the cheapest manoeuvre and of the curve straight
