@@ -76,7 +76,7 @@ def run(work: Work, options: Options) -> bool:
         If Ray or the cluster is not there, a machine lacks the program or has another build of it,
         or the program refuses its input.
     KeyboardInterrupt
-        On Ctrl-C, once the machines were told to stop. What is finished stays.
+        On Ctrl-C, once Ray was told to stop. What is finished stays.
     """
     total, tasks = work.tasks()
     progress = Progress(work.program, total, total - len(tasks))
@@ -105,6 +105,8 @@ def run(work: Work, options: Options) -> bool:
         return _Run(ray, work, options, progress).all(tasks)
     finally:
         ray.cloudpickle.unregister_pickle_by_value(worker)
+        # Ends what still runs, too. Ray's `cancel` may abort this process where a task ends
+        # meanwhile (ray-project/ray#54527).
         ray.shutdown()
 
 
@@ -142,10 +144,6 @@ class _Run:
                         self.progress.say(f"{task.name}: given up after {attempt} tries: {reason}")
                         self.lost.append(task.name)
                 self.progress.show(len(self.running))
-        except BaseException:
-            for reference in self.running:
-                self.ray.cancel(reference, force=True)
-            raise
         finally:
             self.progress.show(0, last=True)
         return not self.lost
