@@ -248,6 +248,20 @@ fn a_start_that_is_hard_to_come_by_is_left() {
 }
 
 #[test]
+fn where_a_disc_passes_and_the_car_does_not_nothing_is_flooded() {
+    let mut hars = planner(Method::HA_RS, &[]);
+    // Each took more than 160,000 expansions when searches only shunned where the car fits at no heading.
+    for (seed, number) in
+        [(20_261_128, 623), (78, 974), (79, 1113), (79, 1326), (80, 144), (80, 810)]
+    {
+        let problem = Problem::new(&clutter(seed, number)).unwrap();
+        let result = hars.plan(&problem, BUDGET);
+        let spent = result.expansions;
+        assert!(result.outcome.is_ok() && spent < 60_000, "{seed} {number}: {spent}");
+    }
+}
+
+#[test]
 fn among_anything_known_manoeuvres_and_curves_are_held_against_what_searches_find() {
     let usual = [Method::N3P, Method::HA_RS, Method::HA_HOLD];
     let mut planners = usual.map(|method| {

@@ -226,7 +226,7 @@ impl HybridAStarConfig {
     /// are left their share even when a coarse one goes on and on.
     ///
     /// On each lattice the domain grows while there is no way within it; and a search that does
-    /// not come to an end soon begins anew, careful of gaps that the car does not pass and, on the
+    /// not come to an end soon begins anew, careful of where the car fits (`fitting_cost_to_go`) and, on the
     /// coarsest lattice, in strides twice as long. Where even that does not come to an end, the finest lattice
     /// would not either: if `either_way` will do, such strides are tried from the start to the goal first, since
     /// it may be the start that is hard to come by.
@@ -237,8 +237,12 @@ impl HybridAStarConfig {
         expansions: &mut usize,
         mut search: impl FnMut(Attempt, &mut usize) -> Result<T, NoPath>,
     ) -> Result<T, NoPath> {
-        /// Of what a lattice may spend, the part for the first look.
-        const FIRST_LOOK: usize = 8;
+        /// The least that a first look takes.
+        const LEAST: usize = 300;
+        /// Who may spend less has no use for a wave that takes as long as some thousand expansions.
+        const CAREFUL: usize = 10_000;
+        // Of what a lattice may spend, the part for the first look. Who closes the way by no curve takes longer.
+        let first_look = if either_way { 16 } else { 8 };
         let mut result = Err(NoPath::BudgetSpent);
         let mut domain = 0;
         for (i, resolution) in self.resolutions.iter().enumerate() {
@@ -247,16 +251,15 @@ impl HybridAStarConfig {
             *expansions -= reserve;
             if last && either_way && matches!(result, Err(NoPath::BudgetSpent)) {
                 let (resolution, domain) = (&self.resolutions[0].doubled(), domains[domain]);
-                let config = self;
-                let careful_from_start =
-                    Attempt { config, resolution, domain, careful: true, from_start: true };
-                result = search(careful_from_start, expansions);
+                let (config, careful) = (self, *expansions >= CAREFUL);
+                let from_start = Attempt { config, resolution, domain, careful, from_start: true };
+                result = search(from_start, expansions);
                 if result.is_ok() {
                     break;
                 }
             }
             loop {
-                let later = *expansions - *expansions / FIRST_LOOK;
+                let later = *expansions - (*expansions / first_look).max(LEAST).min(*expansions);
                 *expansions -= later;
                 let (config, within) = (self, domains[domain]);
                 let first = Attempt {
@@ -277,7 +280,7 @@ impl HybridAStarConfig {
                         let again = Attempt {
                             resolution: if i == 0 { &strides } else { resolution },
                             domain: domains[domain],
-                            careful: true,
+                            careful: *expansions >= CAREFUL,
                             ..first
                         };
                         result = search(again, expansions);
@@ -309,7 +312,7 @@ pub(super) struct Attempt<'a> {
     pub resolution: &'a Resolution,
     /// Where it may go.
     pub domain: Aabb,
-    /// Whether its cost-to-go shuns gaps in which the car fits at no heading.
+    /// Whether its cost-to-go is that of a car that fits where it goes.
     pub careful: bool,
     /// Whether it runs from the start to the goal, instead of from the goal to the start.
     pub from_start: bool,

@@ -2,17 +2,18 @@
 //!
 //! Shortest distances to the goal over a grid, with the largest disc around the rear axle
 //! that the footprint always covers. Computed lazily: the wave from the goal advances only
-//! as far as somebody asks (Dial's buckets, since steps cost 10 or 14 units), and the grid is
-//! stored in pages allocated where the wave goes.
+//! as far as somebody asks.
 //!
 //! A cell is blocked only where the disc collides from every point of it, so that an infinite
 //! distance is a proof: no motion within the domain leads there.
 
-use std::f64::consts::{FRAC_1_SQRT_2, TAU};
+use std::f64::consts::FRAC_1_SQRT_2;
 
-use crate::geometry::{Aabb, Pose, Vec2, distance_to_segment};
+use crate::geometry::{Aabb, Vec2, distance_to_segment};
 use crate::vehicle::Vehicle;
 use crate::world::collision::CollisionWorld;
+
+use super::wave::{Cell, Front, PAGE, PAGE_CELLS, Raster};
 
 /// Not reached yet.
 const UNKNOWN: u32 = u32::MAX >> 1;
@@ -30,40 +31,20 @@ const STEPS: [(i32, i32, u32); 8] = [
     (-1, 1, 14),
     (-1, -1, 14),
 ];
-/// How many times as far a step counts into a cell where the car fits at no heading.
-const NARROW: u32 = 12;
 /// More than the costliest step.
-const BUCKETS: usize = 256;
-/// Headings at which a careful wave asks whether the car fits.
-const HEADINGS: usize = 16;
-/// Cells per side of a page.
-const PAGE: usize = 64;
-/// No page yet.
-const NONE: u32 = u32::MAX;
+const BUCKETS: usize = 16;
 /// The wave goes no further than so many pages (64 MB): beyond, distances are lower bounds.
 const MOST_PAGES: usize = 1 << 12;
 
 /// Grid distances to one goal. Buffers are reused from call to call.
 #[derive(Debug, Default)]
 pub(super) struct CostToGo {
-    origin: Vec2,
-    cell: f64,
+    raster: Raster,
     /// A cell is blocked by an edge nearer than this to its centre, metres.
     reach: f64,
-    size: (i32, i32),
-    pages_x: usize,
-    /// Page index per page position; `NONE` where the wave has not been.
-    page_of: Vec<u32>,
-    /// Costs of all pages, `PAGE × PAGE` each.
+    /// Costs of the cells of all pages.
     costs: Vec<u32>,
-    /// By cell of all pages, where the wave is careful: whether the car fits, as far as asked.
-    fits: Vec<Option<bool>>,
-    careful: bool,
-    buckets: Vec<Vec<(i32, i32)>>,
-    /// The cost whose bucket is being emptied.
-    front: u32,
-    /// Entries in all buckets.
-    waiting: usize,
+    front: Front<Cell>,
 }
 
 impl CostToGo {
@@ -77,49 +58,23 @@ impl CostToGo {
 
     /// Prepares distances to `goal` within `domain` for `vehicle`, in cells of
     /// [`CostToGo::cell`].
-    ///
-    /// A `careful` wave takes what is no proof into account as well: where the car fits at no
-    /// heading in a cell's middle, it counts the way through as much longer.
-    pub fn reset(
-        &mut self,
-        domain: &Aabb,
-        wanted: f64,
-        careful: bool,
-        vehicle: &Vehicle,
-        goal: Pose,
-    ) {
-        let extent = domain.max - domain.min;
+    pub fn reset(&mut self, domain: &Aabb, wanted: f64, vehicle: &Vehicle, goal: Vec2) {
         let cell = Self::cell(wanted, vehicle);
-        self.origin = domain.min;
-        self.cell = cell;
+        self.raster.reset(domain, cell);
         // The disc collides from every point of a cell.
         self.reach = inscribed_radius(vehicle) - cell * FRAC_1_SQRT_2;
-        self.size = ((extent.x / cell).ceil() as i32 + 1, (extent.y / cell).ceil() as i32 + 1);
-        let pages = |cells: i32| (cells.max(0) as usize).div_ceil(PAGE);
-        self.pages_x = pages(self.size.0);
-        self.page_of.clear();
-        self.page_of.resize(self.pages_x * pages(self.size.1), NONE);
         self.costs.clear();
-        self.fits.clear();
-        self.careful = careful;
-        self.buckets.resize_with(BUCKETS, Vec::new);
-        self.buckets.iter_mut().for_each(Vec::clear);
-        self.front = 0;
-        self.waiting = 0;
-        if let Some(c) = self.cell_of(goal.position()) {
-            self.buckets[0].push(c);
-            self.waiting = 1;
-        }
+        self.front.reset(BUCKETS, self.raster.cell_of(goal));
     }
 
     /// Metres from `p` to the goal; infinite where nothing leads to it within the domain.
     /// `world` has the obstacles, the same from one reset to the next.
     pub fn distance(&mut self, p: Vec2, world: &CollisionWorld) -> f64 {
-        let Some(c) = self.cell_of(p) else { return f64::INFINITY };
+        let Some(c) = self.raster.cell_of(p) else { return f64::INFINITY };
         let i = self.index(c, world);
-        while self.costs[i] & SETTLED == 0 && self.waiting > 0 {
-            if self.costs.len() > MOST_PAGES * PAGE * PAGE {
-                return self.metres(self.front);
+        while self.costs[i] & SETTLED == 0 && !self.front.is_empty() {
+            if self.raster.pages() > MOST_PAGES {
+                return self.metres(self.front.cost);
             }
             self.advance(world);
         }
@@ -130,92 +85,61 @@ impl CostToGo {
     }
 
     fn metres(&self, cost: u32) -> f64 {
-        f64::from(cost) * self.cell / 10.0
+        f64::from(cost) * self.raster.cell / 10.0
     }
 
-    /// Empties the bucket of the front cost.
+    /// Lets the wave go on from all at its front.
     fn advance(&mut self, world: &CollisionWorld) {
-        let slot = self.front as usize % BUCKETS;
-        while let Some(c) = self.buckets[slot].pop() {
-            self.waiting -= 1;
+        while let Some(c) = self.front.pop() {
             let i = self.index(c, world);
             if self.costs[i] & SETTLED != 0 {
                 continue;
             }
-            self.costs[i] = self.front | SETTLED;
+            self.costs[i] = self.front.cost | SETTLED;
             for (dx, dy, step) in STEPS {
                 let next = (c.0 + dx, c.1 + dy);
-                if next.0 < 0 || next.1 < 0 || next.0 >= self.size.0 || next.1 >= self.size.1 {
+                if !self.raster.has(next) {
                     continue;
                 }
                 let j = self.index(next, world);
-                let known = self.costs[j];
+                let (known, cost) = (self.costs[j], self.front.cost + step);
                 // Settled costs are larger than any other number.
-                if known == BLOCKED || known > UNKNOWN {
-                    continue;
-                }
-                let narrow = self.careful && !self.fits(next, j, world);
-                let cost = self.front + if narrow { NARROW * step } else { step };
-                if cost < known {
+                if known != BLOCKED && known <= UNKNOWN && cost < known {
                     self.costs[j] = cost;
-                    self.buckets[cost as usize % BUCKETS].push(next);
-                    self.waiting += 1;
+                    self.front.push(cost, next);
                 }
             }
         }
-        self.front += 1;
     }
 
-    /// Whether the car fits into the middle of a cell, kept at `index`, at some heading.
-    fn fits(&mut self, (x, y): (i32, i32), index: usize, world: &CollisionWorld) -> bool {
-        if let Some(fits) = self.fits[index] {
-            return fits;
-        }
-        let middle = self.origin + Vec2::new(f64::from(x), f64::from(y)) * self.cell;
-        let heading = |i: usize| i as f64 / HEADINGS as f64 * TAU;
-        let fits =
-            (0..HEADINGS).any(|i| world.pose_is_free(Pose::new(middle.x, middle.y, heading(i))));
-        self.fits[index] = Some(fits);
-        fits
-    }
-
-    fn cell_of(&self, p: Vec2) -> Option<(i32, i32)> {
-        let c = (p - self.origin) / self.cell;
-        let (x, y) = (c.x.round(), c.y.round());
-        let inside =
-            x >= 0.0 && y >= 0.0 && x < f64::from(self.size.0) && y < f64::from(self.size.1);
-        inside.then_some((x as i32, y as i32))
+    /// Whether the disc collides from every point of a cell.
+    pub fn is_blocked(&mut self, cell: Cell, world: &CollisionWorld) -> bool {
+        let i = self.index(cell, world);
+        self.costs[i] == BLOCKED
     }
 
     /// Where the cost of a cell is kept. Makes its page if need be.
     #[inline]
-    fn index(&mut self, (x, y): (i32, i32), world: &CollisionWorld) -> usize {
-        let (x, y) = (x as usize, y as usize);
-        let (page_x, page_y) = (x / PAGE, y / PAGE);
-        let mut page = self.page_of[page_y * self.pages_x + page_x];
-        if page == NONE {
-            page = self.make_page(page_x, page_y, world);
+    fn index(&mut self, cell: Cell, world: &CollisionWorld) -> usize {
+        if let Some(index) = self.raster.index(cell) {
+            return index;
         }
-        page as usize * PAGE * PAGE + y % PAGE * PAGE + x % PAGE
+        self.make_page(cell, world);
+        self.raster.index(cell).expect("the page was just made")
     }
 
     #[cold]
-    fn make_page(&mut self, page_x: usize, page_y: usize, world: &CollisionWorld) -> u32 {
+    fn make_page(&mut self, cell: Cell, world: &CollisionWorld) {
         let first = self.costs.len();
-        let page = (first / (PAGE * PAGE)) as u32;
-        self.page_of[page_y * self.pages_x + page_x] = page;
-        self.costs.resize(first + PAGE * PAGE, UNKNOWN);
-        if self.careful {
-            self.fits.resize(first + PAGE * PAGE, None);
-        }
+        let corner = self.raster.make_page(cell);
+        self.costs.resize(first + PAGE_CELLS, UNKNOWN);
         if self.reach <= 0.0 {
-            return page;
+            return;
         }
-        let center = |cell: usize| cell as f64 * self.cell;
-        let corner = self.origin + Vec2::new(center(page_x * PAGE), center(page_y * PAGE));
-        let side = center(PAGE - 1);
+        let (corner, cell) = (self.raster.middle(corner), self.raster.cell);
+        let side = (PAGE - 1) as f64 * cell;
         let centers = Aabb { min: corner, max: corner + Vec2::new(side, side) };
-        let (cell, reach, costs) = (self.cell, self.reach, &mut self.costs[first..]);
+        let (reach, costs) = (self.reach, &mut self.costs[first..]);
         world.edges_near(&centers.inflated(reach), |a, b| {
             let near = Aabb::around([a, b]).inflated(reach);
             let low = (near.min - corner) / cell;
@@ -225,14 +149,13 @@ impl CostToGo {
             };
             for y in range(low.y, high.y) {
                 for x in range(low.x, high.x) {
-                    let center = corner + Vec2::new(x as f64 * cell, y as f64 * cell);
+                    let center = corner + Vec2::new(x as f64, y as f64) * cell;
                     if distance_to_segment(center, a, b) < reach {
                         costs[y * PAGE + x] = BLOCKED;
                     }
                 }
             }
         });
-        page
     }
 }
 
@@ -244,7 +167,7 @@ fn inscribed_radius(vehicle: &Vehicle) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Polygon;
+    use crate::geometry::{Polygon, Pose};
     use crate::world::Obstacles;
 
     /// A world of boxes `[x_min, y_min, x_max, y_max]`.
@@ -260,11 +183,11 @@ mod tests {
         let vehicle = Vehicle::default();
         let domain = Aabb::new(-10.0, -10.0, 20.0, 20.0);
         let mut c = CostToGo::default();
-        let goal = Pose::new(10.0, 0.0, 0.0);
-        c.reset(&domain, 0.5, false, &vehicle, goal);
+        let goal = Vec2::new(10.0, 0.0);
+        c.reset(&domain, 0.5, &vehicle, goal);
         let open = world(&[], &vehicle);
         assert!((c.distance(Vec2::new(0.0, 0.0), &open) - 10.0).abs() < 0.5);
-        c.reset(&domain, 0.5, false, &vehicle, goal);
+        c.reset(&domain, 0.5, &vehicle, goal);
         let wall = world(&[[4.8, -10.0, 5.2, 5.0]], &vehicle);
         let around = c.distance(Vec2::new(0.0, 0.0), &wall);
         assert!((14.0..17.0).contains(&around), "{around}");
@@ -282,7 +205,7 @@ mod tests {
         let world = world(&ring, &vehicle);
         let mut c = CostToGo::default();
         let domain = Aabb::new(-10.0, -10.0, 10.0, 10.0);
-        c.reset(&domain, 0.5, false, &vehicle, Pose::default());
+        c.reset(&domain, 0.5, &vehicle, Vec2::default());
         assert_eq!(c.distance(Vec2::new(8.0, 8.0), &world), f64::INFINITY);
         assert!(c.distance(Vec2::new(0.5, 0.5), &world) < 1.0);
     }
@@ -319,7 +242,7 @@ mod tests {
                 let world = world(&walls, &vehicle);
                 let domain = Aabb::new(-long, -long, 2.0 * long, long);
                 let mut c = CostToGo::default();
-                c.reset(&domain, 0.5, false, &vehicle, Pose::new(-long / 2.0, y, 0.0));
+                c.reset(&domain, 0.5, &vehicle, Vec2::new(-long / 2.0, y));
                 let through = c.distance(Vec2::new(1.5 * long, y), &world);
                 assert!(through < 2.3 * long, "{vehicle:?} {offset}: {through}");
             }
@@ -333,7 +256,7 @@ mod tests {
         let mut c = CostToGo::default();
         // 46,000 cells a side: their number is beyond 32 bits.
         let domain = Aabb::new(0.0, 0.0, 2300.0, 2300.0);
-        c.reset(&domain, 0.05, false, &vehicle, Pose::new(1.0, 1.0, 0.0));
+        c.reset(&domain, 0.05, &vehicle, Vec2::new(1.0, 1.0));
         let near = c.distance(Vec2::new(30.0, 1.0), &open);
         assert!((near - 29.0).abs() < 0.1, "{near}");
         let far = c.distance(Vec2::new(2299.0, 2299.0), &open);

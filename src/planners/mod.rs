@@ -3,7 +3,7 @@
 //! Every method of a table, learnt or not, meets the evaluation as a [`Planner`].
 //! The search core is in [`hybrid_astar`]; its parts are `search` (nodes and expansion),
 //! `open` (queues), `lattice` (visited states), `cost_to_go` and `nonholonomic` (the two
-//! heuristics), [`analytic`] (Reeds-Shepp expansion) and [`cost`]. Its variants are
+//! heuristics), `fitting_cost_to_go` (what a search follows that has lost its way; both spread over `wave`), [`analytic`] (Reeds-Shepp expansion) and [`cost`]. Its variants are
 //! [`PlainHybridAStar`] (no curves), [`MultiHeuristicHybridAStar`] and
 //! [`ScenarioHybridAStar`] (parallel spots). [`goals`] plans a scene with any of them: to the
 //! cheapest of its goals, out of a contact (`contact`), and out of a spot as into one (`leaving`); `continuous` makes its path one that a car can
@@ -20,6 +20,7 @@ mod continuous;
 pub mod cost;
 mod cost_to_go;
 mod exit_manoeuvre;
+mod fitting_cost_to_go;
 pub mod goals;
 pub mod hybrid_astar;
 mod joint;
@@ -39,6 +40,7 @@ mod shape;
 mod shortcut;
 mod steered;
 mod transitions;
+mod wave;
 
 pub use analytic::AnalyticTail;
 pub use budget::{Budget, Effort};

@@ -14,6 +14,7 @@ use super::analytic::GoalSet;
 use super::config::{Attempt, HybridAStarConfig, Resolution};
 use super::cost::{CostModel, DriveState};
 use super::cost_to_go::CostToGo;
+use super::fitting_cost_to_go::FittingCostToGo;
 use super::lattice::Lattice;
 use super::multi_heuristic::Guides;
 use super::nonholonomic::NonHolonomic;
@@ -24,6 +25,8 @@ use super::{NoPath, Problem};
 
 /// In place of a primitive: the node is a root.
 const ROOT: u32 = u32::MAX;
+/// How many times as much a careful search makes of its estimates.
+const CAREFUL: f32 = 1.25;
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
@@ -58,6 +61,9 @@ pub(super) struct Search {
     open: OpenList,
     lattice: Lattice,
     cost_to_go: CostToGo,
+    /// What a careful search follows in its place.
+    fitting: FittingCostToGo,
+    careful: bool,
     nonholonomic: NonHolonomic,
     primitives: Vec<Primitive>,
     start: Pose,
@@ -77,7 +83,7 @@ pub(super) struct Search {
 /// What the estimate of the cost from the start to a pose is made of.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Estimate {
-    /// Among the obstacles, turning on the spot: the A* cost-to-go.
+    /// Among the obstacles, turning on the spot: the A* cost-to-go, or that of a careful search.
     pub grid: f32,
     /// With the vehicle's turning circle, without obstacles: the least Reeds-Shepp cost.
     pub curve: f32,
@@ -111,14 +117,19 @@ impl Search {
         if let Some(guides) = &mut self.guides {
             guides.reset(problem);
         }
+        self.careful = careful;
         // A careful search has lost its way once: it follows its estimates more greedily.
-        self.weight = config.heuristic_weight as f32 * if careful { 2.0 } else { 1.0 };
+        self.weight = config.heuristic_weight as f32 * if careful { CAREFUL } else { 1.0 };
         self.nodes.clear();
         self.open.clear();
         self.since_curve = 0;
         self.lattice.reset(&domain, resolution.cell, resolution.headings);
         self.nonholonomic.reset(vehicle, &config.cost);
-        self.cost_to_go.reset(&domain, config.cost_to_go_cell, careful, vehicle, start);
+        let cell = config.cost_to_go_cell;
+        self.cost_to_go.reset(&domain, cell, vehicle, start.position());
+        if careful {
+            self.fitting.reset(&domain, cell, vehicle, start);
+        }
         self.prepare_primitives(resolution, vehicle, problem.collision.footprint());
         let distance = self.cost_to_go.distance(goal.pose.position(), &problem.collision);
         self.enclosed = !distance.is_finite();
@@ -296,7 +307,13 @@ impl Search {
     /// Estimates the cost from the start to `pose`.
     fn estimate_to_come(&mut self, pose: Pose, problem: &Problem, model: &CostModel) -> Estimate {
         let per_metre = model.forward.min(model.backward);
-        let grid = self.cost_to_go.distance(pose.position(), &problem.collision) * per_metre;
+        let Self { cost_to_go, fitting, .. } = self;
+        let distance = if self.careful {
+            fitting.distance(pose, cost_to_go, &problem.collision)
+        } else {
+            cost_to_go.distance(pose.position(), &problem.collision)
+        };
+        let grid = distance * per_metre;
         if !grid.is_finite() {
             return Estimate { grid: f32::INFINITY, curve: 0.0 };
         }
