@@ -116,6 +116,7 @@ proptest! {
         let contact = planned.problem.contact.as_ref().unwrap();
         prop_assert!((contact.start_depth - deep).abs() < 1e-4, "{}", contact.start_depth);
         prop_assert_eq!(contact.goal_depth, 0.0);
+        prop_assert!(planned.result.expansions <= BUDGET.max_expansions);
         if let Ok(path) = &planned.result.outcome {
             let file = PathFile::new(&scene, &planned.problem.frame, path, "test");
             let depths: Vec<f64> =
@@ -142,6 +143,7 @@ proptest! {
         prop_assume!(depth(&scene, &obstacle, scene.start) == 0.0);
         scene.obstacles.push(obstacle.clone());
         let planned = plan(&mut ha_rs(), &scene).unwrap();
+        prop_assert!(planned.result.expansions <= BUDGET.max_expansions);
         if let Ok(path) = &planned.result.outcome {
             let file = PathFile::new(&scene, &planned.problem.frame, path, "test");
             let depths: Vec<f64> =

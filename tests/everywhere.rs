@@ -9,7 +9,7 @@ use n3p::geometry::Pose;
 use n3p::lab::evaluation::oracle;
 use n3p::n3p::{Method, MethodSettings, Models};
 use n3p::output::PathFile;
-use n3p::planners::{Budget, HybridAStarConfig, Planner, Problem};
+use n3p::planners::{Budget, HybridAStarConfig, NoPath, Planner, Problem};
 use n3p::vehicle::Vehicle;
 use n3p::world::clutter::clutter;
 use n3p::world::generate::{GeneratorConfig, generate};
@@ -233,6 +233,50 @@ fn narrow_doors_and_long_ways_round_are_found() {
     for method in [Method::HA_RS, Method::MHHA] {
         let path = plan(planner(method, &[]).as_mut(), &round);
         assert!(path.length() < 75.0, "{method}: {}", path.length());
+    }
+}
+
+/// Searches keep tables of where they may go, as large as what lies around start and goal.
+#[test]
+fn what_lies_far_away_takes_no_memory() {
+    let walled = |vehicle: Vehicle, goal: Pose| {
+        let (l, far) = (vehicle.length, 9e6);
+        // The start stands before a wall; something else lies as far away as scenes may reach.
+        let obstacles = vec![
+            vec![[2.0 * l, -9.0 * l], [2.1 * l, -9.0 * l], [2.1 * l, 9.0 * l], [2.0 * l, 9.0 * l]],
+            vec![[far, far], [far - 1.0, far], [far, far - 1.0]],
+            vec![[-far, -far], [1.0 - far, -far], [-far, 1.0 - far]],
+        ];
+        Scene { name: "far".to_owned(), vehicle, goal, obstacles, ..Scene::default() }
+    };
+    let small = Vehicle {
+        length: 0.4,
+        width: 0.2,
+        wheelbase: 0.25,
+        rear_overhang: 0.07,
+        ..Vehicle::default()
+    };
+    for method in [Method::HA_RS, Method::HA_HOLD, Method::MHHA, Method::HA] {
+        let mut planner = planner(method, &[]);
+        let car = Vehicle::default();
+        let near = Problem::new(&walled(car, Pose::new(12.0, 25.0, 0.0))).unwrap();
+        let path = planner.plan(&near, BUDGET).outcome.unwrap_or_else(|e| panic!("{method}: {e}"));
+        assert!(path.length() < 120.0, "{method}: {}", path.length());
+        let far = Problem::new(&walled(small, Pose::new(9_000.0, 0.0, 0.0))).unwrap();
+        let reason = planner.plan(&far, BUDGET).outcome.unwrap_err();
+        assert_eq!(reason.to_string(), "the goal is too far for a search", "{method}");
+        // Within a ring nothing is found at last, and everything around was looked at.
+        let mut enclosed = walled(car, Pose::new(12.0, 25.0, 0.0));
+        for [x0, y0, x1, y1] in [
+            [-9.0, -9.0, 9.0, -8.9],
+            [-9.0, 8.9, 9.0, 9.0],
+            [-9.0, -9.0, -8.9, 9.0],
+            [8.9, -9.0, 9.0, 9.0],
+        ] {
+            enclosed.obstacles.push(vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]]);
+        }
+        let reason = planner.plan(&Problem::new(&enclosed).unwrap(), BUDGET).outcome.unwrap_err();
+        assert_eq!(reason, NoPath::Enclosed, "{method}");
     }
 }
 

@@ -37,7 +37,9 @@ impl<'a> Arbitrary<'a> for Asked {
             terms.standstill = *u.choose(&StandstillSteering::ALL)?;
         }
         let effort = *u.choose(&Effort::ALL)?;
-        let max_expansions = usize::from(u16::arbitrary(u)? % 2000);
+        // Few, so that a plan takes little time; at times so many that searches become careful.
+        let most = if u8::arbitrary(u)? % 16 == 0 { u16::MAX } else { 2000 };
+        let max_expansions = usize::from(u16::arbitrary(u)? % most);
         let budget = Budget { max_expansions, effort };
         Ok(Self { scene: scenes::scene(u)?, method, terms, budget })
     }

@@ -10,6 +10,12 @@ use super::cost::CostModel;
 use super::multi_heuristic::MultiHeuristicConfig;
 use super::{NoPath, Problem};
 
+/// Goals farther than this from the start are not searched for, metres for the default vehicle: 200,000
+/// motions lead hardly farther, and lattices are tables of where they may go.
+const FARTHEST_GOAL: f64 = 20_000.0;
+/// Nobody goes round an obstacle by more than this, metres for the default vehicle.
+const FARTHEST_ROUND: f64 = 5_000.0;
+
 /// Settings of the search; lengths are those for the default vehicle (see [`Vehicle::scale`]).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -168,13 +174,17 @@ impl HybridAStarConfig {
         }
     }
 
-    /// [`HybridAStarConfig::for_vehicle`]; fails where settings are out of their ranges, before
-    /// anything is sized by them.
-    pub(super) fn for_search(&self, vehicle: &Vehicle) -> Result<Self, NoPath> {
-        match self.validate() {
-            Ok(()) => Ok(self.for_vehicle(vehicle)),
-            Err(_) => Err(NoPath::Failed("settings out of range")),
+    /// [`HybridAStarConfig::for_vehicle`]; fails where settings are out of their ranges or the goal is too far
+    /// for any search, before anything is sized by them.
+    pub(super) fn for_search(&self, problem: &Problem) -> Result<Self, NoPath> {
+        let Problem { vehicle, start, goal, .. } = problem;
+        if self.validate().is_err() {
+            return Err(NoPath::Failed("settings out of range"));
         }
+        if start.distance(*goal) > FARTHEST_GOAL * vehicle.scale() {
+            return Err(NoPath::Failed("the goal is too far for a search"));
+        }
+        Ok(self.for_vehicle(vehicle))
     }
 
     /// The goal of `problem` with the entry straights that are free; where the lane begins farther
@@ -197,11 +207,13 @@ impl HybridAStarConfig {
     }
 
     /// Where a search may go, one box after another: around start and goal; farther around them;
-    /// around all obstacles, beyond which nothing is in the way. All within the bounds.
+    /// around all obstacles, beyond which nothing is in the way, but no more than [`FARTHEST_ROUND`] around
+    /// start and goal. All within the bounds.
     pub(super) fn domains(&self, problem: &Problem, start: Pose, goal: Pose) -> Vec<Aabb> {
         let ends = Aabb::around([start.position(), goal.position()]);
         let near = ends.inflated(self.domain_margin);
         let farther = ends.inflated(4.0 * self.domain_margin);
+        let farthest = ends.inflated(FARTHEST_ROUND * problem.vehicle.scale());
         let obstacles = problem.collision.obstacles_aabb().inflated(self.domain_margin);
         let whole = Aabb { min: near.min.inf(&obstacles.min), max: near.max.sup(&obstacles.max) };
         let within = |mut domain: Aabb| {
@@ -213,7 +225,7 @@ impl HybridAStarConfig {
         };
         let common = |a: Aabb, b: Aabb| Aabb { min: a.min.sup(&b.min), max: a.max.inf(&b.max) };
         let mut domains = vec![within(near)];
-        for larger in [within(common(farther, whole)), within(whole)] {
+        for larger in [within(common(farther, whole)), within(common(farthest, whole))] {
             if domains.last() != Some(&larger) {
                 domains.push(larger);
             }

@@ -223,15 +223,16 @@ fn is_clear_between(one: &CollisionWorld, path: &Path, from: f64, to: f64) -> bo
 ///
 /// The planner's own path is one candidate: it plans with a car that is smaller towards what it
 /// touches, and may well keep the law. The others go out of the contact by one arc each; the
-/// cheapest is taken. All arcs together have the budget once more.
+/// cheapest is taken. The first has half of the budget, all others together what it leaves.
 pub(super) fn plan(planner: &mut dyn Planner, problem: &Problem, budget: Budget) -> PlanResult {
     let Some(contact) = &problem.contact else { return planner.plan(problem, budget) };
     let vehicle = &problem.vehicle;
     let model = planner.config().cost.scaled(vehicle.scale());
     let cost = |segments: &[Segment]| model.path(vehicle, segments);
-    let mut best = planner.plan(problem, budget);
+    let half = Budget { max_expansions: budget.max_expansions / 2, ..budget };
+    let mut best = planner.plan(problem, half);
     let mut expansions = best.expansions;
-    let mut left = budget.max_expansions;
+    let mut left = budget.max_expansions.saturating_sub(expansions);
     // The shortest ways first: those that cannot become the cheapest are not planned.
     let radius = 1.0 / vehicle.max_curvature();
     let per_metre = model.forward.min(model.backward);

@@ -180,7 +180,7 @@ impl HybridAStar {
         direct: Option<Leg>,
         expansions: &mut usize,
     ) -> Result<Leg, NoPath> {
-        let config = self.config.for_search(&problem.vehicle)?;
+        let config = self.config.for_search(problem)?;
         let domains = config.domains(problem, start, goal.pose);
         self.search_in(&domains, problem, start, goal, direct, expansions)
     }
@@ -194,7 +194,7 @@ impl HybridAStar {
         goal: &GoalSet,
         expansions: &mut usize,
     ) -> Result<Leg, NoPath> {
-        let config = self.config.for_search(&problem.vehicle)?;
+        let config = self.config.for_search(problem)?;
         let half = config.resolutions[0].cell / 2.0;
         let mut domains = config.domains(problem, start, goal.pose);
         domains.iter_mut().for_each(|domain| *domain = domain.inflated(half));
@@ -211,7 +211,7 @@ impl HybridAStar {
         expansions: &mut usize,
     ) -> Result<Leg, NoPath> {
         let mut best = direct;
-        let config = self.config.for_search(&problem.vehicle)?;
+        let config = self.config.for_search(problem)?;
         let result = config.coarse_to_fine(domains, true, expansions, |attempt, expansions| {
             let result = if attempt.from_start {
                 self.search_from_start(attempt, problem, start, goal, &mut best, expansions)
@@ -356,7 +356,7 @@ impl HybridAStar {
         if cost <= effort.enough() * self.lower_bound(problem, goal) {
             return path;
         }
-        let Ok(config) = self.config.for_search(&problem.vehicle) else { return path };
+        let Ok(config) = self.config.for_search(problem) else { return path };
         let mut domain = config.domains(problem, problem.start, goal.pose)[0];
         if spent.is_some_and(|spent| spent > 0) {
             // Half a cell aside of the lattice that the path comes from: what that one misses is found.

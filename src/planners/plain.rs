@@ -66,7 +66,7 @@ impl Planner for PlainHybridAStar {
     }
 
     fn plan(&mut self, problem: &Problem, budget: Budget) -> PlanResult {
-        let config = match self.config.for_search(&problem.vehicle) {
+        let config = match self.config.for_search(problem) {
             Ok(config) => config,
             Err(reason) => return PlanResult::none(reason, 0),
         };

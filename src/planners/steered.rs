@@ -40,7 +40,7 @@ pub(super) fn first_accepted(
     expansions: &mut usize,
     mut accept: impl FnMut(&Joined) -> bool,
 ) {
-    let Ok(config) = config.for_search(&problem.vehicle) else { return };
+    let Ok(config) = config.for_search(problem) else { return };
     let goal = config.goal_set(problem);
     let domains = config.domains(problem, problem.start, goal.pose);
     let mut queue = turning.map_or_else(Search::default, Search::steered);
