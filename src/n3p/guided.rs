@@ -35,7 +35,9 @@ mod foreseen;
 pub(crate) mod known;
 
 use foreseen::{FAR_FROM_FORESEEN, Ranking};
-use known::{Checked, DEAR_BY_UNUSUAL, Known, Prepared, Standard, directly, most_changes};
+use known::{
+    Checked, DEAR_BY_UNUSUAL, Known, Prepared, Standard, directly, is_in_sight, most_changes,
+};
 
 /// Expansions that the paper's two legs may spend, so that a pose just beside the feasible
 /// ones does not use up what the full search needs.
@@ -48,6 +50,13 @@ const DOUBTFUL: f64 = 2.0;
 const SECOND_SEARCH: usize = 1500;
 /// The same by a spot that no usual cell stands for: the manoeuvres may not be made for it.
 const UNUSUAL_SEARCH: usize = 3_000;
+/// Who comes from out of foresight's sight to a spot that is bounded: what costs so many times the estimate.
+const FROM_AFAR: f64 = 1.5;
+/// Where nothing was learnt: what costs so many times the least after all.
+const ANYWHERE: f64 = 1.4;
+/// What then still costs so many times what it should is searched for as long as it takes as a rule.
+const STILL_DEAR: f64 = 1.25;
+const LAST_SEARCH: usize = 40_000;
 
 /// What `n3p` tries before it searches. The paper's rows have no such settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -251,6 +260,10 @@ impl GuidedPlanner {
         let guidance = guidance(entry, route);
         let plain = self.hars.goal_set(problem);
         let spent = before - *left;
+        if effort != Effort::First && !self.is_familiar(problem) {
+            let mut standard = Standard::new(problem, false);
+            return Ok((self.refine_anywhere(problem, &mut standard, leg.path, left), guidance));
+        }
         Ok((self.refine(problem, &plain, leg.path, effort, spent, left), guidance))
     }
 
@@ -285,31 +298,67 @@ impl GuidedPlanner {
         if !is_usual {
             known = self.look_further(problem, known);
         }
-        let Known { path, mut guidance, least, foreseen, .. } = known;
         let before = *left;
-        let goal = standard.goal(&self.hars).clone();
-        let mut refined = if standard.is_familiar {
-            self.hars.cut(problem, path.clone()).0
+        let refined = if standard.is_familiar {
+            self.cut_or_searched(problem, &mut standard, &known, left)
         } else {
-            self.hars.refine(problem, &goal, path.clone(), Effort::Usual, None, left)
+            self.refine_anywhere(problem, &mut standard, known.path.clone(), left)
         };
-        let cost = self.path_cost(problem, &refined);
-        let limit = foreseen.map_or(DEAR_BY_UNUSUAL * least, |f| FAR_FROM_FORESEEN * f);
-        let is_dear = cost > limit
-            && cost > standard.enough(&mut self.hars)
-            && (foreseen.is_some() || standard.is_unusual());
-        let doubtful = foreseen.is_none()
-            && refined.direction_changes() > most_changes(problem.kind)
-            && cost > DOUBTFUL * least;
-        if is_dear {
-            refined = self.or_searched(problem, &goal, refined, UNUSUAL_SEARCH, false, left);
-        } else if doubtful {
-            refined = self.or_searched(problem, &goal, refined, SECOND_SEARCH, false, left);
-        }
-        if refined != path {
-            guidance = Self::anew(before - *left);
-        }
+        let guidance =
+            if refined == known.path { known.guidance } else { Self::anew(before - *left) };
         (refined, guidance)
+    }
+
+    /// What is known, with its corners cut, or what a search finds where it is dear even so.
+    fn cut_or_searched(
+        &mut self,
+        problem: &Problem,
+        standard: &mut Standard,
+        known: &Known,
+        left: &mut usize,
+    ) -> Path {
+        let goal = standard.goal(&self.hars).clone();
+        let (cut, _) = self.hars.cut(problem, known.path.clone());
+        let cost = self.path_cost(problem, &cut);
+        let least = known.least.max(standard.least(&mut self.hars));
+        // Far more than was foreseen, or, where nothing is foreseen, than is estimated: from afar, or by an
+        // unusual spot.
+        let (limit, is_doubted) = match known.foreseen {
+            Some(foreseen) => (FAR_FROM_FORESEEN * foreseen, true),
+            None if !is_in_sight(problem) => (FROM_AFAR * least, true),
+            None => (DEAR_BY_UNUSUAL * known.least, standard.is_unusual()),
+        };
+        if is_doubted && cost > limit && cost > standard.enough(&mut self.hars) {
+            let found = self.or_searched(problem, &goal, cut, UNUSUAL_SEARCH, false, left);
+            return if self.path_cost(problem, &found) > STILL_DEAR * limit {
+                self.or_searched(problem, &goal, found, LAST_SEARCH, false, left)
+            } else {
+                found
+            };
+        }
+        let has_many_changes = cut.direction_changes() > most_changes(problem.kind);
+        if known.foreseen.is_none() && has_many_changes && cost > DOUBTFUL * known.least {
+            return self.or_searched(problem, &goal, cut, SECOND_SEARCH, false, left);
+        }
+        cut
+    }
+
+    /// A path of a problem of which nothing was learnt, or a better one.
+    fn refine_anywhere(
+        &mut self,
+        problem: &Problem,
+        standard: &mut Standard,
+        path: Path,
+        left: &mut usize,
+    ) -> Path {
+        let goal = standard.goal(&self.hars).clone();
+        let refined = self.hars.refine(problem, &goal, path, Effort::Usual, None, left);
+        let is_far = self.path_cost(problem, &refined) > ANYWHERE * standard.least(&mut self.hars);
+        if is_far {
+            self.or_searched(problem, &goal, refined, LAST_SEARCH, false, left)
+        } else {
+            refined
+        }
     }
 
     fn path_cost(&self, problem: &Problem, path: &Path) -> f64 {

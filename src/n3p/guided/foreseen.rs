@@ -15,6 +15,8 @@ const AT_ONCE: f64 = 1.02;
 const WILL_DO: f64 = 1.2;
 const OFF_FORESEEN: f64 = 1.3;
 pub(super) const FAR_FROM_FORESEEN: f64 = 1.6;
+/// What is foreseen to cost so many times the estimate is not believed.
+const ABSURD: f64 = 10.0;
 
 impl Known {
     /// Whether it costs clearly more than the best plan was foreseen to cost, or nothing is foreseen.
@@ -73,6 +75,10 @@ impl GuidedPlanner {
         let least = least(problem, &cost, estimates);
         ranking.outlook = foresight.look(problem, prepared.stance, [estimates.0, estimates.1]);
         let foreseen = ranking.outlook.cost;
+        // It never saw the like.
+        if foreseen > ABSURD * least {
+            return (None, None);
+        }
         let order = ranking.order(codes, look_up.estimates());
         let first = look_up.promising(order, any, AT_ONCE * foreseen);
         let mut best = first.map(|plan| prepared.known(plan, least));

@@ -40,8 +40,6 @@ pub(super) const DEAR_BY_UNUSUAL: f64 = 2.0;
 const TRUSTED: f64 = 1.5;
 /// Near the goal what costs so many times the estimate is doubted, whatever is foreseen.
 const DOUBTED: f64 = 1.5;
-/// Where nothing was learnt only what costs so many times the estimate is taken as it is.
-const USUAL_ANYWHERE: f64 = 1.15;
 /// Changes of gear that a parallel spot takes at most as a rule, and a bay.
 const TO_AND_FRO: usize = 4;
 const INTO_A_BAY: usize = 2;
@@ -182,7 +180,7 @@ impl<'a> Standard<'a> {
     }
 
     /// The least cost through empty space.
-    fn least(&mut self, hars: &mut HybridAStar) -> f64 {
+    pub(super) fn least(&mut self, hars: &mut HybridAStar) -> f64 {
         let goal = self.goal.get_or_init(|| hars.goal_set(self.problem));
         *self.least.get_or_insert_with(|| hars.lower_bound(self.problem, goal))
     }
@@ -471,13 +469,15 @@ impl GuidedPlanner {
     /// estimate. With the usual changes of gear that is much, since manoeuvres for them were learnt in many worlds; by an
     /// unusual spot it is at most twice the estimate, and where nothing was learnt little more than it.
     pub(super) fn is_usual(&mut self, known: &Known, standard: &mut Standard) -> bool {
-        // The library's estimate is at hand, the other one takes a tenth of a plan.
-        let usual = if standard.is_familiar { USUAL } else { USUAL_ANYWHERE };
-        if known.cost <= usual * known.least || known.cost <= standard.enough(&mut self.hars) {
-            return true;
-        }
         if !standard.is_familiar {
-            return false;
+            return known.cost <= standard.enough(&mut self.hars);
+        }
+        // The library's estimate is at hand, the other one takes a tenth of a plan.
+        let is_off = known.foreseen.is_some() && known.is_off_foreseen();
+        if (known.cost <= USUAL * known.least && !is_off)
+            || known.cost <= standard.enough(&mut self.hars)
+        {
+            return true;
         }
         let times = known.cost / known.least.max(standard.least(&mut self.hars));
         let trust = match known.is_as_foreseen() {
