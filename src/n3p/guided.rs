@@ -54,7 +54,7 @@ const UNUSUAL_SEARCH: usize = 3_000;
 const FROM_AFAR: f64 = 1.5;
 /// Where nothing was learnt: what costs so many times the least after all.
 const ANYWHERE: f64 = 1.4;
-/// What then still costs so many times what it should is searched for as long as it takes as a rule.
+/// What then still is so much dearer than foreseen is searched for as long as it takes as a rule.
 const STILL_DEAR: f64 = 1.25;
 const LAST_SEARCH: usize = 40_000;
 
@@ -330,7 +330,8 @@ impl GuidedPlanner {
         };
         if is_doubted && cost > limit && cost > standard.enough(&mut self.hars) {
             let found = self.or_searched(problem, &goal, cut, UNUSUAL_SEARCH, false, left);
-            return if self.path_cost(problem, &found) > STILL_DEAR * limit {
+            let is_still_dear = self.path_cost(problem, &found) > STILL_DEAR * limit;
+            return if known.foreseen.is_some() && is_still_dear {
                 self.or_searched(problem, &goal, found, LAST_SEARCH, false, left)
             } else {
                 found
