@@ -262,7 +262,8 @@ impl GuidedPlanner {
         let spent = before - *left;
         if effort != Effort::First && !self.is_familiar(problem) {
             let mut standard = Standard::new(problem, false);
-            return Ok((self.refine_anywhere(problem, &mut standard, leg.path, left), guidance));
+            let path = self.refine_anywhere(problem, &mut standard, leg.path, spent, left);
+            return Ok((path, guidance));
         }
         Ok((self.refine(problem, &plain, leg.path, effort, spent, left), guidance))
     }
@@ -302,7 +303,7 @@ impl GuidedPlanner {
         let refined = if standard.is_familiar {
             self.cut_or_searched(problem, &mut standard, &known, left)
         } else {
-            self.refine_anywhere(problem, &mut standard, known.path.clone(), left)
+            self.refine_anywhere(problem, &mut standard, known.path.clone(), 0, left)
         };
         let guidance =
             if refined == known.path { known.guidance } else { Self::anew(before - *left) };
@@ -344,16 +345,20 @@ impl GuidedPlanner {
         cut
     }
 
-    /// A path of a problem of which nothing was learnt, or a better one.
+    /// A path of a problem of which nothing was learnt, found with `spent` expansions, or a better one.
     fn refine_anywhere(
         &mut self,
         problem: &Problem,
         standard: &mut Standard,
         path: Path,
+        spent: usize,
         left: &mut usize,
     ) -> Path {
         let goal = standard.goal(&self.hars).clone();
-        let refined = self.hars.refine(problem, &goal, path, Effort::Usual, None, left);
+        // As long as a known path is bettered, or longer where it was hard to find.
+        let patience = |spent| Effort::Usual.patience(spent, *left);
+        let spent = Some(spent).filter(|&spent| patience(Some(spent)) > patience(None));
+        let refined = self.hars.refine(problem, &goal, path, Effort::Usual, spent, left);
         let is_far = self.path_cost(problem, &refined) > ANYWHERE * standard.least(&mut self.hars);
         if is_far {
             self.or_searched(problem, &goal, refined, LAST_SEARCH, false, left)
