@@ -390,7 +390,9 @@ fn tell(scene: &Scene, episode: &Episode) {
 }
 
 fn summary(scene: &Scene, episode: &Episode) -> String {
-    let (row, margin) = (&episode.row, episode.problem.margin);
+    let row = &episode.row;
+    // To a tenth of a millimetre: small vehicles keep a small part of the usual margin.
+    let margin = (episode.problem.margin * 1e4).round() / 1e4;
     let time = row.plan_time_s * 1e3;
     let (Some(length), Some(changes)) = (row.length_m, row.direction_changes) else {
         let hint = if margin > Problem::MARGIN { "; try a smaller --margin" } else { "" };

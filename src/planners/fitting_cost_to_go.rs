@@ -33,7 +33,8 @@ const ASIDE: [f64; 3] = [0.0, 0.3, -0.3];
 const SETTLED: u32 = 1 << 31;
 /// Not reached yet.
 const UNKNOWN: u32 = SETTLED - 1;
-/// The wave goes no further than so many pages (64 MB): beyond, distances are those of its front.
+/// The wave goes no further than so many pages (64 MB, and 16 for what fits): beyond, distances are those of
+/// its front.
 const MOST_PAGES: usize = 1 << 8;
 
 /// A cell and a heading.
