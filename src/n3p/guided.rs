@@ -321,12 +321,13 @@ impl GuidedPlanner {
         let goal = standard.goal(&self.hars).clone();
         let (cut, _) = self.hars.cut(problem, known.path.clone());
         let cost = self.path_cost(problem, &cut);
-        let least = known.least.max(standard.least(&mut self.hars));
         // Far more than was foreseen, or, where nothing is foreseen, than is estimated: from afar, or by an
         // unusual spot.
         let (limit, is_doubted) = match known.foreseen {
             Some(foreseen) => (FAR_FROM_FORESEEN * foreseen, true),
-            None if !is_in_sight(problem) => (FROM_AFAR * least, true),
+            None if !is_in_sight(problem) => {
+                (FROM_AFAR * known.least.max(standard.least(&mut self.hars)), true)
+            }
             None => (DEAR_BY_UNUSUAL * known.least, standard.is_unusual()),
         };
         if is_doubted && cost > limit && cost > standard.enough(&mut self.hars) {

@@ -467,7 +467,7 @@ impl GuidedPlanner {
     /// Whether a plan costs no more than usual: little more than the least through empty space, or about
     /// what was foreseen, if anything was, and then half as much again as [`dear`] allows over the library's
     /// estimate. With the usual changes of gear that is much, since manoeuvres for them were learnt in many worlds; by an
-    /// unusual spot it is at most twice the estimate, and where nothing was learnt little more than it.
+    /// unusual spot it is at most twice the estimate. Where nothing was learnt only empty space counts.
     pub(super) fn is_usual(&mut self, known: &Known, standard: &mut Standard) -> bool {
         if !standard.is_familiar {
             return known.cost <= standard.enough(&mut self.hars);
