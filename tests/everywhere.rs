@@ -12,7 +12,7 @@ use n3p::output::PathFile;
 use n3p::planners::{Budget, HybridAStarConfig, NoPath, Planner, Problem};
 use n3p::vehicle::Vehicle;
 use n3p::world::clutter::clutter;
-use n3p::world::generate::{GeneratorConfig, generate};
+use n3p::world::generate::{GeneratorConfig, LevelConfig, generate};
 use n3p::world::{Level, ParkingType, Scene};
 
 const BUDGET: Budget = Budget::new(200_000);
@@ -303,6 +303,30 @@ fn where_a_disc_passes_and_the_car_does_not_nothing_is_flooded() {
         let spent = result.expansions;
         assert!(result.outcome.is_ok() && spent < 60_000, "{seed} {number}: {spent}");
     }
+}
+
+/// A gap shorter than any that manoeuvres were learnt for takes no search: the car goes to and fro as far as there
+/// is room, with hardly more changes of gear than the best search finds, or fewer.
+#[test]
+fn a_parallel_spot_tighter_than_any_learnt_takes_no_search() {
+    let vehicle = Vehicle::default();
+    let usual = GeneratorConfig::default();
+    let complex = LevelConfig { parallel_spot_width: [5.6, 5.7], ..usual.complex };
+    let config = GeneratorConfig { complex, ..usual };
+    let mut n3p = planner(Method::N3P, &["models/knn.bin", "models/foresight.safetensors"]);
+    let mut hold = planner(Method::HA_HOLD, &[]);
+    let (mut costs, mut expansions) = ([0.0, 0.0], 0);
+    for i in 0..8 {
+        let scene = generate(&config, &vehicle, ParkingType::Parallel, Level::Complex, SEED, i);
+        let problem = Problem::new(&scene).unwrap();
+        expansions += n3p.plan(&problem, BUDGET).expansions;
+        let [known, searched] =
+            [&mut n3p, &mut hold].map(|p| cost(&plan(&mut **p, &scene), &vehicle));
+        assert!(known <= 1.3 * searched, "{}: {known}, not {searched}", scene.name);
+        costs = [costs[0] + known, costs[1] + searched];
+    }
+    assert_eq!(expansions, 0);
+    assert!(costs[0] <= costs[1], "{costs:?}");
 }
 
 #[test]

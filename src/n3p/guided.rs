@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::curves::{Path, Segment};
 use crate::geometry::{Pose, Vec2};
+use crate::planners::exit_manoeuvre::Exit;
 use crate::planners::hybrid_astar::{Entry, GoalSet, Leg};
 use crate::planners::library::{LibrarySearch, Tried};
 use crate::planners::{
@@ -31,6 +32,7 @@ use crate::world::abstraction::{Abstraction, abstractions};
 use crate::selectors::foresight::Foresight;
 use crate::selectors::{Features, PoseSelector};
 
+mod exits;
 mod foreseen;
 pub(crate) mod known;
 mod refined;
@@ -94,6 +96,8 @@ pub struct GuidedPlanner {
     checked: Checked,
     foresight: Option<Arc<Foresight>>,
     ranking: Ranking,
+    /// How the car may leave the spot, once it was asked for.
+    exits: Option<Vec<Exit>>,
 }
 
 impl GuidedPlanner {
@@ -129,6 +133,7 @@ impl GuidedPlanner {
             checked: Checked::default(),
             foresight: None,
             ranking: Ranking::default(),
+            exits: None,
         }
     }
 
@@ -208,7 +213,12 @@ impl GuidedPlanner {
         if has_library && let Some(known) = self.look_up(problem) {
             return Ok(self.settle(problem, known, effort, left));
         }
-        let mut goal = self.hars.goal_set(problem);
+        // Who looked plans up has tried the exits.
+        if !has_library && let Some(known) = self.by_exit(problem, 0.0) {
+            return Ok(self.settle(problem, known, effort, left));
+        }
+        let goal = self.hars.goal_set(problem);
+        let mut goal = self.with_exits(problem, goal);
         for found in self.cells(problem).iter().take(config.abstractions) {
             self.select(problem, found, config.candidates);
             let of_cell = self.hars.goal_set_of_cell(problem, found.shift);
@@ -305,6 +315,7 @@ impl Planner for GuidedPlanner {
 
     fn plan(&mut self, problem: &Problem, budget: Budget) -> PlanResult {
         let mut left = budget.max_expansions;
+        self.exits = None;
         let planned = match self.strategy {
             Strategy::Paper => match self.plan_paper(problem, &mut left) {
                 Some((path, guidance)) => {

@@ -23,7 +23,7 @@ const STUCK: f64 = 0.01;
 /// Bisection ends at this length, metres.
 const PRECISION: f64 = 0.005;
 /// The nose turns no further from the lane's direction, radians.
-const STEEPEST: f64 = FRAC_PI_2;
+pub(super) const STEEPEST: f64 = FRAC_PI_2;
 /// A car turned so far has left the spot, radians.
 const STEEP: f64 = FRAC_PI_3;
 /// Shares of the left arc that leaves the spot after which it may end.
@@ -31,7 +31,7 @@ const SHARES: [f64; 5] = [1.0, 0.85, 0.7, 0.55, 0.4];
 
 /// A pose outside (or on the way out of) the spot, and the motions from there to the goal.
 #[derive(Clone, Debug)]
-pub(super) struct Exit {
+pub(crate) struct Exit {
     /// Where the exit leads.
     pub pose: Pose,
     /// The motions from `pose` to the goal, in driving order.
@@ -41,7 +41,7 @@ pub(super) struct Exit {
 /// Exits from the goal of `problem`: those of the manoeuvre that begins right there, then
 /// those after a straight back. Every `way_in` is free. The goal must lie in a parallel
 /// spot.
-pub(super) fn exits(problem: &Problem) -> Vec<Exit> {
+pub(crate) fn exits(problem: &Problem) -> Vec<Exit> {
     let mut exits = Vec::new();
     for settle in [Settle::Here, Settle::Back] {
         Manoeuvre::new(problem, settle).run(&mut exits);
@@ -58,11 +58,12 @@ enum Settle {
     Back,
 }
 
-struct Manoeuvre<'a> {
-    problem: &'a Problem,
-    pose: Pose,
+/// Motions out of the spot, and where they lead.
+pub(super) struct Manoeuvre<'a> {
+    pub problem: &'a Problem,
+    pub pose: Pose,
     /// Driven so far, outward.
-    driven: Vec<Segment>,
+    pub driven: Vec<Segment>,
 }
 
 impl<'a> Manoeuvre<'a> {
@@ -97,6 +98,13 @@ impl<'a> Manoeuvre<'a> {
         }
     }
 
+    /// Adds the exits along an arc forward on full left lock, if it leaves the spot.
+    pub fn leave_if_free(&self, exits: &mut Vec<Exit>) -> bool {
+        let full_lock = self.problem.vehicle.max_curvature();
+        let room = (STEEPEST - self.pose.heading) / full_lock;
+        self.leave(self.longest(full_lock, Gear::Forward, room), exits)
+    }
+
     /// Adds the exits along the arc `left`, if it leaves the spot: the arc ends at some share
     /// of it, and where there is room another lines the car up with the lane.
     fn leave(&self, left: Segment, exits: &mut Vec<Exit>) -> bool {
@@ -123,7 +131,7 @@ impl<'a> Manoeuvre<'a> {
     }
 
     /// The exit reached by driving `more` from here.
-    fn exit(&self, more: &[Segment]) -> Exit {
+    pub fn exit(&self, more: &[Segment]) -> Exit {
         let pose = more.iter().fold(self.pose, |pose, s| s.end(pose));
         let driven = self.driven.iter().chain(more).rev();
         Exit { pose, way_in: driven.map(|s| s.reversed()).collect() }
@@ -137,7 +145,7 @@ impl<'a> Manoeuvre<'a> {
     }
 
     /// The longest free motion from here of at most `limit` metres.
-    fn longest(&self, curvature: f64, gear: Gear, limit: f64) -> Segment {
+    pub fn longest(&self, curvature: f64, gear: Gear, limit: f64) -> Segment {
         let motion = |length: f64| Segment { curvature, length: gear.sign() * length };
         let free = |length| self.problem.collision.segment_is_free(self.pose, motion(length));
         let (mut low, mut high) = (0.0, limit.max(0.0));

@@ -19,7 +19,7 @@ mod contact;
 mod continuous;
 pub mod cost;
 mod cost_to_go;
-mod exit_manoeuvre;
+pub(crate) mod exit_manoeuvre;
 mod fitting_cost_to_go;
 pub mod goals;
 pub mod hybrid_astar;
@@ -39,6 +39,7 @@ mod search;
 mod shape;
 mod shortcut;
 mod steered;
+pub(crate) mod to_and_fro;
 mod transitions;
 mod wave;
 

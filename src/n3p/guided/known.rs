@@ -57,7 +57,7 @@ const FURTHER: usize = 40;
 const ONE_MOTION: Reach = Reach { motions: 1, manoeuvres: 40, tries: 60 };
 const CHEAPER: f64 = 0.97;
 /// Where there is no plan.
-const TWO_MOTIONS: Reach = Reach { motions: 2, manoeuvres: 100, tries: 300 };
+pub(super) const TWO_MOTIONS: Reach = Reach { motions: 2, manoeuvres: 100, tries: 300 };
 
 /// A library made ready for a way to stand parked and a footprint.
 pub(crate) struct Prepared {
@@ -131,12 +131,13 @@ impl Prepared {
 }
 
 /// A plan by a manoeuvre of a library whose first `manoeuvres` are more than the straight into the spot.
-fn known_by(plan: LibraryPlan, manoeuvres: usize, least: f64) -> Known {
+pub(super) fn known_by(plan: LibraryPlan, manoeuvres: usize, least: f64) -> Known {
     let LibraryPlan { path, cost, manoeuvre, preparatory } = plan;
     let is_straight = manoeuvre >= manoeuvres;
     let preparatory = (!is_straight).then_some(preparatory);
     let route = if is_straight { Route::Direct } else { Route::Library };
-    Known { path, cost, guidance: Guidance { preparatory, route }, least, foreseen: None }
+    let guidance = Guidance { preparatory, route };
+    Known { least, ..Known::unjudged(path, cost, guidance) }
 }
 
 /// Whether cars were seen to come from such starts when what is known was learnt: in sight of a spot that is
@@ -230,19 +231,21 @@ pub(super) struct Known {
     pub(super) least: f64,
     /// What the best plan was foreseen to cost.
     pub(super) foreseen: Option<f64>,
+    /// Whether it costs no more than what was made for this very spot, and so will do.
+    pub(super) is_made_to_measure: bool,
 }
 
 impl Known {
     /// A plan of which no estimate says what the best costs.
     pub(super) fn unjudged(path: Path, cost: f64, guidance: Guidance) -> Self {
-        Self { path, cost, guidance, least: 0.0, foreseen: None }
+        Self { path, cost, guidance, least: 0.0, foreseen: None, is_made_to_measure: false }
     }
 }
 
 /// The plan that is a curve straight to the goal.
 pub(super) fn directly(Leg { path, cost, .. }: Leg, least: f64) -> Known {
     let guidance = Guidance { preparatory: None, route: Route::Direct };
-    Known { path, cost, guidance, least, foreseen: None }
+    Known { least, ..Known::unjudged(path, cost, guidance) }
 }
 
 /// An estimate of what the best plan costs, by those of the cheapest manoeuvre and of the curve straight
@@ -290,6 +293,7 @@ impl GuidedPlanner {
     pub(super) fn look_up(&mut self, problem: &Problem) -> Option<Known> {
         let (known, foreseen) = self.look_ahead(problem);
         let known = known.or_else(|| self.by_estimates(problem));
+        let known = known.or_else(|| self.by_exit(problem, 0.0));
         // A roundabout way that nobody foresaw may be far longer than what a search would find.
         let will_do = |known: &Known| foreseen.is_some() || known.cost <= USUAL * known.least;
         let known = known.or_else(|| self.by_way(problem).filter(will_do))?;
@@ -439,7 +443,7 @@ impl GuidedPlanner {
         let cost = model.path(&problem.vehicle, &path.segments);
         let guidance = Guidance { preparatory: Some(preparatory), route: Route::Library };
         let least = best.map_or(f64::INFINITY, |known| known.least).min(least + in_cost);
-        Some(Known { path, cost, guidance, least, foreseen: None })
+        Some(Known { least, ..Known::unjudged(path, cost, guidance) })
     }
 
     /// Puts the library for `problem` first, prepared if need be, and says whether there is one.

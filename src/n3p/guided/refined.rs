@@ -52,11 +52,14 @@ impl GuidedPlanner {
         if is_usual && !self.hars.passes_near(problem, &known.path) {
             return (known.path, known.guidance);
         }
-        if !is_usual {
+        if !is_usual && !known.is_made_to_measure {
             known = self.look_further(problem, known);
+            known = self.or_exit(problem, known);
         }
         let before = *left;
-        let refined = if standard.is_familiar {
+        let refined = if known.is_made_to_measure {
+            self.hars.cut(problem, known.path.clone()).0
+        } else if standard.is_familiar {
             self.cut_or_searched(problem, &mut standard, &known, left)
         } else {
             self.refine_anywhere(problem, &mut standard, known.path.clone(), 0, left)
