@@ -21,7 +21,7 @@ use n3p::selectors::nearest;
 use n3p::selectors::network::{LAYERS, LayerWeights, pose_from_outputs};
 use n3p::selectors::{Features, Normaliser, PoseSelector, UNIT_COUNT, UNIT_NAMES};
 use n3p::vehicle::Vehicle;
-use n3p::world::cell::{Axis, Grid};
+use n3p::world::cell::{Axis, Cell, Grid};
 use n3p::world::{ParkingType, Stance};
 use proptest::prelude::*;
 use rand::RngExt;
@@ -245,15 +245,27 @@ fn one_file_holds_all_types_and_the_same_input_gives_the_same_bytes() {
     assert!(matches!(error, Err(TrainingError::NoSamples(ParkingType::Forward))));
 }
 
-/// A network would answer the same for bays of any slant.
+/// Networks for angled bays see how the bay slants, and stand beside those of other grids.
 #[test]
-fn networks_are_not_trained_for_angled_bays() {
+fn networks_for_angled_bays_see_the_slant() {
     let dir = tempfile::tempdir().unwrap();
-    let (kind, path) = (ParkingType::Angled, dir.path().join("mlp.safetensors"));
-    let all = samples(kind, &[0, 1], 20, 5);
-    let error = training::mlp::train(&metadata(), &all, kind, &quick(1), &path).unwrap_err();
-    assert!(matches!(error, TrainingError::NoNetwork(ParkingType::Angled)), "{error}");
-    assert!(!path.exists());
+    let path = |kind: ParkingType| dir.path().join(format!("mlp-{kind}.safetensors"));
+    for kind in [ParkingType::Angled, KIND] {
+        let all = samples(kind, &[0, 1], 20, 5);
+        training::mlp::train(&metadata(), &all, kind, &quick(2), &path(kind)).unwrap();
+    }
+    let both = MlpSelector::load_all(path(KIND), &[path(ParkingType::Angled)]).unwrap();
+    let [first, second] = [0, 1].map(|i| both.headers().nth(i).unwrap().layers[0]);
+    assert_eq!([first, second], [6, 8]);
+    let grid = metadata().grid;
+    let stances = grid.stances(ParkingType::Angled);
+    let cell = grid.cell(ParkingType::Angled, 0);
+    let answers: Vec<Pose> = [stances[0], stances[stances.len() - 1]]
+        .map(|stance| Features::new(Pose::new(-5.0, 5.0, 0.1), Cell { stance, ..cell }))
+        .iter()
+        .map(|features| both.predict(features).unwrap())
+        .collect();
+    assert!(answers[0].distance(answers[1]) > 1e-6, "{answers:?}");
 }
 
 /// Whoever learns in worlds knows more, whatever the order of rows, and what is used most comes first.

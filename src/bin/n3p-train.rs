@@ -198,7 +198,6 @@ fn mlp(args: &MlpArgs) -> anyhow::Result<ExitCode> {
         artefact::check_writable(&out(kind)).or_bad_input()?;
     }
     let (data, kinds) = read(&args.common)?;
-    kinds.iter().try_for_each(|&kind| training::mlp::check_kind(kind)).or_bad_input()?;
     for kind in kinds {
         let out = out(kind);
         let (metadata, samples) = (&data.metadata, &data.samples);

@@ -220,7 +220,7 @@ impl Models {
         }
         if methods.iter().any(|m| m.learnt() == Some(Learnt::Mlp)) {
             let network = |kind| find_model(format!("mlp-{kind}.safetensors"));
-            found.extend(ParkingType::SQUARE.map(network));
+            found.extend(ParkingType::ALL.map(network));
         }
         let courses = methods.iter().filter_map(|m| m.course());
         found.extend(courses.map(|course| find_model(format!("rl-{course}.safetensors"))));

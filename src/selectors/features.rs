@@ -2,12 +2,14 @@
 
 use crate::geometry::{Pose, wrap_angle};
 use crate::vehicle::Vehicle;
+use crate::world::ParkingType;
 use crate::world::cell::{Cell, Grid};
 
 /// What a selector sees (paper, eq. 6): the start in the spot frame and the cell.
 ///
 /// Defined once: Parquet columns, and normaliser and tensors of the models for one vehicle, all
-/// follow [`Features::NAMES`]; those for any vehicle follow [`UNIT_NAMES`].
+/// follow [`Features::NAMES`], networks for angled bays [`Features::SLANTED_NAMES`]; those for any vehicle follow
+/// [`UNIT_NAMES`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Features {
     /// Rear-axle start, spot frame; heading in (−π, π].
@@ -29,6 +31,25 @@ impl Features {
         "dead_end_m",
     ];
 
+    /// Number of features of angled bays.
+    pub const SLANTED_COUNT: usize = Self::COUNT + 2;
+    /// Their names, in order: of angled bays it matters how the parked car stands, too.
+    pub const SLANTED_NAMES: [&'static str; Self::SLANTED_COUNT] = [
+        "start_x_m",
+        "start_y_m",
+        "start_heading_rad",
+        "lane_width_m",
+        "spot_width_m",
+        "dead_end_m",
+        "parked_heading_cos",
+        "parked_heading_sin",
+    ];
+
+    /// The names for a parking type, in order.
+    pub fn names(kind: ParkingType) -> &'static [&'static str] {
+        if kind == ParkingType::Angled { &Self::SLANTED_NAMES } else { &Self::NAMES }
+    }
+
     /// Features of a start and a grid cell.
     pub fn new(start: Pose, cell: Cell) -> Self {
         Self { start: Pose { heading: wrap_angle(start.heading), ..start }, cell }
@@ -40,6 +61,13 @@ impl Features {
         let Features { start, cell } = self;
         [start.x, start.y, start.heading, cell.lane_width, cell.spot_width, cell.dead_end]
             .map(|v| v as f32)
+    }
+
+    /// The values in the order of [`Features::SLANTED_NAMES`].
+    pub fn slanted_values(&self) -> [f32; Self::SLANTED_COUNT] {
+        let (sin, cos) = self.cell.stance.heading().sin_cos();
+        let [x, y, heading, lane_width, spot_width, dead_end] = self.values();
+        [x, y, heading, lane_width, spot_width, dead_end, cos as f32, sin as f32]
     }
 
     /// The values in the order of [`UNIT_NAMES`], for a model that serves any vehicle.

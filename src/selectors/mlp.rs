@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::artefact::{self, ArtefactError, Fault};
-use super::network::{self, LAYERS, LayerWeights, Network, OUTPUTS};
+use super::network::{self, LayerWeights, Network, OUTPUTS};
 use super::tensor_file::{self, Content};
 use super::{Features, Normaliser, PoseSelector};
 use crate::geometry::Pose;
@@ -34,9 +34,9 @@ pub struct MlpHeader {
     pub vehicle: Vehicle,
     /// The grid of cells.
     pub grid: Grid,
-    /// Names of the inputs, [`Features::NAMES`].
+    /// Names of the inputs, [`Features::names`] of the type.
     pub features: Vec<String>,
-    /// Widths of the layers, [`LAYERS`].
+    /// Widths of the layers, [`layers_for`] the type.
     pub layers: Vec<usize>,
     /// Scaling of the inputs.
     pub input: Normaliser,
@@ -52,13 +52,18 @@ pub struct MlpHeader {
     pub crate_version: String,
 }
 
+/// Widths of the layers for a parking type, the paper's: networks for angled bays see the slant, too.
+pub fn layers_for(kind: ParkingType) -> [usize; 6] {
+    network::layers(Features::names(kind).len())
+}
+
 /// The bytes of a file: the same input gives the same bytes.
 ///
 /// # Panics
 ///
-/// When `weights` are not those of [`LAYERS`].
+/// When `weights` are not those of [`layers_for`] the type.
 pub fn encode(header: &MlpHeader, weights: &[LayerWeights]) -> Vec<u8> {
-    let tensors = tensor_file::layer_tensors("", &LAYERS, weights);
+    let tensors = tensor_file::layer_tensors("", &layers_for(header.kind), weights);
     let header = serde_json::to_string(header).expect("a header is plain data");
     tensor_file::encode(&header, tensors)
 }
@@ -74,7 +79,7 @@ struct Trained {
 /// Up to one network per parking type.
 #[derive(Clone, Debug)]
 pub struct MlpSelector {
-    /// Never empty; the first one's vehicle and grid are everyone's.
+    /// Never empty; the first one's vehicle is everyone's.
     networks: Vec<Trained>,
 }
 
@@ -87,7 +92,7 @@ impl MlpSelector {
     /// Checks the content of the file at `path`.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, ArtefactError> {
         let (header, weights) = decode(bytes).map_err(|fault| fault.of(path))?;
-        let network = Network::new(&LAYERS, &weights);
+        let network = Network::new(&layers_for(header.kind), &weights);
         Ok(Self { networks: vec![Trained { path: path.to_owned(), header, network }] })
     }
 
@@ -98,8 +103,7 @@ impl MlpSelector {
         })
     }
 
-    /// Both selectors' networks in one. They must share vehicle and grid and differ in
-    /// parking type.
+    /// Both selectors' networks in one. They must share the vehicle and differ in parking type.
     pub fn combine(mut self, other: Self) -> Result<Self, ArtefactError> {
         for new in other.networks {
             let first = &self.networks[0];
@@ -109,13 +113,9 @@ impl MlpSelector {
                 &new.header.vehicle,
                 &first.header.vehicle,
             )?;
-            let problem = if new.header.grid != first.header.grid {
-                Some(format!("its grid of cells differs from that of {}", first.path.display()))
-            } else {
-                let same = self.networks.iter().find(|n| n.header.kind == new.header.kind);
-                same.map(|n| format!("{} is for {}, too", n.path.display(), n.header.kind))
-            };
-            if let Some(problem) = problem {
+            let same = self.networks.iter().find(|n| n.header.kind == new.header.kind);
+            if let Some(same) = same {
+                let problem = format!("{} is for {}, too", same.path.display(), same.header.kind);
                 return Err(Fault::Mismatch(problem).of(&new.path));
             }
             self.networks.push(new);
@@ -138,12 +138,20 @@ impl MlpSelector {
         self.networks.iter().map(|n| &n.header)
     }
 
+    fn of(&self, kind: ParkingType) -> Option<&Trained> {
+        self.networks.iter().find(|n| n.header.kind == kind)
+    }
+
     /// The predicted preparatory pose (rear axle, spot frame); `None` for a parking type
     /// without a network.
     pub fn predict(&self, features: &Features) -> Option<Pose> {
-        let trained = self.networks.iter().find(|n| n.header.kind == features.cell.kind())?;
-        let input = trained.header.input.normalise(features.values());
-        let output: [f32; OUTPUTS] = trained.network.forward(&input);
+        let kind = features.cell.kind();
+        let trained = self.of(kind)?;
+        let (scaling, network) = (&trained.header.input, &trained.network);
+        let output: [f32; OUTPUTS] = match kind {
+            ParkingType::Angled => network.forward(&scaling.normalise(features.slanted_values())),
+            _ => network.forward(&scaling.normalise(features.values())),
+        };
         Some(network::pose_from_outputs(trained.header.output.restore(output)))
     }
 }
@@ -156,8 +164,8 @@ impl PoseSelector for MlpSelector {
         }
     }
 
-    fn grid(&self, _kind: ParkingType) -> &Grid {
-        &self.networks[0].header.grid
+    fn grid(&self, kind: ParkingType) -> &Grid {
+        &self.of(kind).unwrap_or(&self.networks[0]).header.grid
     }
 
     fn kinds(&self) -> Vec<ParkingType> {
@@ -173,19 +181,20 @@ fn decode(bytes: &[u8]) -> Result<(MlpHeader, Vec<LayerWeights>), Fault> {
     let header: MlpHeader =
         serde_json::from_str(&json).map_err(|e| Fault::Header(e.to_string()))?;
     check_header(&header).map_err(Fault::Header)?;
-    let layers = tensor_file::layers(&tensors, "", &LAYERS)?;
+    let layers = tensor_file::layers(&tensors, "", &layers_for(header.kind))?;
     Ok((header, layers))
 }
 
 fn check_header(header: &MlpHeader) -> Result<(), String> {
     header.vehicle.validate().map_err(|e| e.to_string())?;
     header.grid.validate().map_err(|e| e.to_string())?;
-    if header.layers != LAYERS {
-        return Err(format!("layers: expected {LAYERS:?}, got {:?}", header.layers));
+    let (layers, names) = (layers_for(header.kind), Features::names(header.kind));
+    if header.layers != layers {
+        return Err(format!("layers: expected {layers:?}, got {:?}", header.layers));
     }
-    if header.features != Features::NAMES {
-        return Err(format!("features: expected {:?}, got {:?}", Features::NAMES, header.features));
+    if header.features != names {
+        return Err(format!("features: expected {names:?}, got {:?}", header.features));
     }
-    header.input.check(Features::COUNT).map_err(|e| format!("input {e}"))?;
+    header.input.check(names.len()).map_err(|e| format!("input {e}"))?;
     header.output.check(OUTPUTS).map_err(|e| format!("output {e}"))
 }

@@ -11,7 +11,6 @@ use crate::lab::evaluation::SuiteConfig;
 use crate::lab::evaluation::suite::{self, Drawn, MAX_COUNT, World};
 use crate::lab::training::MlpConfig;
 use crate::lab::training::foresight::ForesightConfig;
-use crate::lab::training::mlp::check_kind;
 use crate::lab::training::rl::RlConfig;
 use crate::lab::training::worlds::WorldsConfig;
 use crate::n3p::RolloutConfig;
@@ -290,13 +289,6 @@ impl ExperimentConfig {
         if let Some(foresight) = &self.train.foresight {
             foresight.validate().map_err(|e| format!("train.foresight: {e}"))?;
         }
-        if self.needs_mlp() {
-            let mut kinds = self.evaluate.types.iter();
-            let check = |&kind: &ParkingType| check_kind(kind);
-            kinds
-                .try_for_each(check)
-                .map_err(|e| format!("evaluate.methods names mlp-n3p: {e}"))?;
-        }
         if self.courses().next().is_some() {
             self.train.rl.validate().map_err(|e| format!("train.rl: {e}"))?;
         }
@@ -454,14 +446,6 @@ mod tests {
         assert!(config.to_toml().contains("scenes = [\"../lot\"]"), "{}", config.to_toml());
         let folder = config.scene_folders().next().unwrap();
         assert!(folder.ends_with("../lot") && folder.starts_with(&config.folder), "{folder:?}");
-    }
-
-    #[test]
-    fn there_are_no_networks_for_angled_bays() {
-        let angled = MINIMAL.replace("count = 2", "types = [\"angled\"]\ncount = 2");
-        assert!(read(&angled).is_ok());
-        let error = read(&angled.replace("\"ha-rs\"", "\"mlp-n3p\"")).unwrap_err().to_string();
-        assert!(error.contains("evaluate.methods names mlp-n3p: no network"), "{error}");
     }
 
     #[test]

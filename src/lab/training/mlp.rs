@@ -23,7 +23,7 @@ use super::{MlpConfig, TrainingError, Validation, card, solved, write_beside};
 use crate::lab::dataset::{Metadata, Sample, content_sha256, validation_cells};
 use crate::selectors::artefact;
 use crate::selectors::mlp::{self, MlpHeader};
-use crate::selectors::network::{LAYERS, outputs_from_pose};
+use crate::selectors::network::outputs_from_pose;
 use crate::selectors::{Features, Normaliser};
 use crate::world::ParkingType;
 
@@ -53,14 +53,6 @@ pub struct TrainingLog {
     pub reach: Reach,
 }
 
-/// Whether there are networks for a parking type: not for angled bays, whose slant no feature tells.
-pub fn check_kind(kind: ParkingType) -> Result<(), TrainingError> {
-    match kind {
-        ParkingType::Angled => Err(TrainingError::NoNetwork(kind)),
-        _ => Ok(()),
-    }
-}
-
 /// Trains a network of `kind` and writes it to `out`, with its log, its model card and the
 /// loss curve (`.training.svg`) beside it.
 #[allow(clippy::missing_panics_doc, reason = "what is written is plain data")]
@@ -71,8 +63,26 @@ pub fn train(
     config: &MlpConfig,
     out: &Path,
 ) -> Result<TrainingLog, TrainingError> {
+    match kind {
+        ParkingType::Angled => {
+            train_with(metadata, samples, kind, config, out, Features::slanted_values)
+        }
+        _ => train_with(metadata, samples, kind, config, out, Features::values),
+    }
+}
+
+/// The same, where `values` of the features are the inputs.
+fn train_with<const N: usize>(
+    metadata: &Metadata,
+    samples: &[Sample],
+    kind: ParkingType,
+    config: &MlpConfig,
+    out: &Path,
+    values: fn(&Features) -> [f32; N],
+) -> Result<TrainingLog, TrainingError> {
     config.validate()?;
-    check_kind(kind)?;
+    let layers = mlp::layers_for(kind);
+    let features = |e: &Example| values(&Features::new(e.start, e.cell));
     let solved = solved(samples, kind, metadata.grid.cell_count(kind))?;
     if solved.is_empty() {
         return Err(TrainingError::NoSamples(kind));
@@ -90,8 +100,8 @@ pub fn train(
         kind,
         vehicle: metadata.vehicle,
         grid: metadata.grid,
-        features: Features::NAMES.map(str::to_owned).to_vec(),
-        layers: LAYERS.to_vec(),
+        features: Features::names(kind).iter().map(|name| (*name).to_owned()).collect(),
+        layers: layers.to_vec(),
         input: Normaliser::fit(&raw_inputs),
         output: Normaliser::fit(&raw_outputs),
         data_sha256: content_sha256(metadata, samples.iter().filter(|s| s.cell.kind() == kind)),
@@ -105,7 +115,7 @@ pub fn train(
         Rows::new(&inputs, &outputs, &header.input, &header.output)
     };
     let (train, validation_rows) = (rows(&train), rows(&validation));
-    let model = Trainable::new(&LAYERS, config.seed)?;
+    let model = Trainable::new(&layers, config.seed)?;
 
     let first = predictions(&model, &validation_rows, &header.output)?;
     let mut log = TrainingLog {
@@ -138,10 +148,6 @@ pub fn train(
     let picture = curve::svg(&format!("mlp, {kind}: loss"), &log.losses)?;
     artefact::write(&out.with_extension("training.svg"), picture.as_bytes())?;
     Ok(log)
-}
-
-fn features(example: &Example) -> [f32; Features::COUNT] {
-    Features::new(example.start, example.cell).values()
 }
 
 /// Training and validation rows. Sample indices validate, the same in every cell, or whole

@@ -44,11 +44,6 @@ pub enum TrainingError {
     /// Nothing to learn from.
     #[error("the data set has no solved sample of type {0}; collect some: n3p-collect --type {0}")]
     NoSamples(ParkingType),
-    /// Features have no slant, so one network would answer the same for bays of any.
-    #[error(
-        "no network is trained for type {0}: networks do not see how a bay slants; n3p-train knn learns of it"
-    )]
-    NoNetwork(ParkingType),
     /// No scene to learn from.
     #[error("no world drawn has room for the vehicle; ask for more worlds")]
     NoWorlds,

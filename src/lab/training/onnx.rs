@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::selectors::artefact::{self, ArtefactError, Fault};
 use crate::selectors::fleet::UNIT_LAYERS;
 use crate::selectors::foresight::{MANOEUVRE_LAYERS, SCENE_LAYERS};
-use crate::selectors::network::{LAYERS, LayerWeights};
+use crate::selectors::network::LayerWeights;
 use crate::selectors::tensor_file::{self, Content};
 use crate::selectors::{Normaliser, fleet, foresight, knn_file, mlp};
 
@@ -59,8 +59,10 @@ fn networks(bytes: &[u8]) -> Result<Vec<Dense>, Fault> {
         Content::Policy => Err(Fault::NoNetwork),
         Content::Mlp => {
             let (json, tensors) = tensor_file::decode(bytes, mlp::VERSION)?;
-            let header: Value = serde_json::from_str(&json).map_err(damaged)?;
-            Ok(vec![scaled(&header, "", &LAYERS, &tensors)?])
+            let header: mlp::MlpHeader = serde_json::from_str(&json).map_err(damaged)?;
+            let layers = mlp::layers_for(header.kind);
+            let header = serde_json::to_value(header).expect("plain data");
+            Ok(vec![scaled(&header, "", &layers, &tensors)?])
         }
         Content::Fleet => {
             let (json, tensors) = tensor_file::decode(bytes, fleet::VERSION)?;

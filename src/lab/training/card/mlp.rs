@@ -8,7 +8,8 @@ use super::{INPUTS, VERSION, data, metrics, name, number, percent, spots, vehicl
 use crate::lab::dataset::Metadata;
 use crate::lab::training::mlp::TrainingLog;
 use crate::lab::training::{Targets, Validation};
-use crate::selectors::network::LAYERS;
+use crate::selectors::mlp::layers_for;
+use crate::world::ParkingType;
 
 /// The card of the network `out`. `rows`: of its parking type in the data set, solved or not.
 pub(in crate::lab::training) fn mlp(
@@ -18,13 +19,18 @@ pub(in crate::lab::training) fn mlp(
     log: &TrainingLog,
 ) -> String {
     let (file, spots) = (name(out), spots(log.kind));
-    let layers = LAYERS.map(|width| width.to_string()).join(" → ");
-    let parameters: usize = LAYERS.windows(2).map(|size| size[1] * (size[0] + 1)).sum();
+    let widths = layers_for(log.kind);
+    let layers = widths.map(|width| width.to_string()).join(" → ");
+    let parameters: usize = widths.windows(2).map(|size| size[1] * (size[0] + 1)).sum();
     let solved = log.train_rows + log.validation_rows;
     let reach = log.reach;
     let (to_goal, vehicle) = (percent(reach.to_goal), vehicle(metadata));
     let data = data(metadata, &log.data_sha256, &[(log.kind, rows, solved)]);
     let training = mlp_training(out, log);
+    let slant = match log.kind {
+        ParkingType::Angled => "| cos ψ, sin ψ | | ψ: heading of the parked car |\n",
+        _ => "",
+    };
     let metrics = metrics(&[(log.kind, log.validation_rows, log.validation, reach)]);
     let chosen = match (log.config.targets, log.config.validation) {
         (Targets::PerCell, Validation::Starts) => {
@@ -46,7 +52,7 @@ The planners `mlp-n3p` and, without a KNN model, `n3p` ask it where to drive fir
 says and search where it does not help, so a bad answer costs planning time, not clearance. The model is
 no planner and no controller: it sees neither obstacles nor anything else outside of the cell.
 
-{INPUTS}
+{INPUTS}{slant}
 | out | unit | |
 |---|---|---|
 | x, y | m | the preparatory pose |
