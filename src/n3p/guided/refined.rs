@@ -54,7 +54,9 @@ impl GuidedPlanner {
         }
         if !is_usual && !known.is_made_to_measure {
             known = self.look_further(problem, known);
-            known = self.or_exit(problem, known);
+            if standard.is_unusual() {
+                known = self.or_exit(problem, known);
+            }
         }
         let before = *left;
         let refined = if known.is_made_to_measure {
