@@ -213,10 +213,6 @@ impl GuidedPlanner {
         if has_library && let Some(known) = self.look_up(problem) {
             return Ok(self.settle(problem, known, effort, left));
         }
-        // Who looked plans up has tried the exits.
-        if !has_library && let Some(known) = self.by_exit(problem, 0.0) {
-            return Ok(self.settle(problem, known, effort, left));
-        }
         let goal = self.hars.goal_set(problem);
         let mut goal = self.with_exits(problem, goal);
         for found in self.cells(problem).iter().take(config.abstractions) {
