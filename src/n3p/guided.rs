@@ -6,6 +6,7 @@
 //! joins is the plan, without any search. Where the first few cannot be joined, the curve straight
 //! to the goal is one more way. Where there is none, several poses of the selector are tried, then
 //! one search goes to the goal or any of these poses. Who starts within a manoeuvre may drive its rest.
+//! Into a parallel spot for which nothing known serves, such as a tighter one, a manoeuvre is made to measure (`exits`).
 //! What costs more than usual for its spot and its changes of gear is looked at further, and its corners
 //! are cut, as are those of what passes something near. What then is still far from what was foreseen is
 //! searched for once more; without foresight, what costs more than twice the estimate, by an unusual spot or

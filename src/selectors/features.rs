@@ -22,14 +22,10 @@ impl Features {
     /// Number of features.
     pub const COUNT: usize = 6;
     /// Their names, in order.
-    pub const NAMES: [&'static str; Self::COUNT] = [
-        "start_x_m",
-        "start_y_m",
-        "start_heading_rad",
-        "lane_width_m",
-        "spot_width_m",
-        "dead_end_m",
-    ];
+    pub const NAMES: [&'static str; Self::COUNT] = {
+        let [x, y, heading, lane_width, spot_width, dead_end, ..] = Self::SLANTED_NAMES;
+        [x, y, heading, lane_width, spot_width, dead_end]
+    };
 
     /// Number of features of angled bays.
     pub const SLANTED_COUNT: usize = Self::COUNT + 2;
